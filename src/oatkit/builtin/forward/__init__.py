@@ -1,0 +1,1 @@
+"""Built-in forward models, one method per file."""

@@ -1,0 +1,1 @@
+"""Built-in readers of scan files, one method per file."""
