@@ -32,7 +32,7 @@ Weight = float | Literal["l-curve", "hold-out"]
 """Type of a solver's weight: a number above 0, or the rule of `oatkit.weights` that chooses it."""
 
 
-class Plugin(Parameters, ABC):
+class Plugin(Parameters, ABC):  # type: ignore[metaclass]
     """What all plugins are: a frozen set of parameters with a name, picklable and hashable."""
 
 

@@ -59,7 +59,7 @@ def param(
     numbers, each one of a tuple; where a field also takes words, they are left alone.
     """
     bounds = Bounds(unit, above, at_least, below, at_most)
-    return Field(default, description=text, json_schema_extra={"oatkit": bounds})  # type: ignore[dict-item]
+    return Field(default, description=text, json_schema_extra={"oatkit": bounds})
 
 
 def bounds_of(field: FieldInfo) -> Bounds:

@@ -134,7 +134,9 @@ def spectral_norm(problem: Problem, steps: int = 40, tolerance: float = 1e-4) ->
     steps = min(steps, *problem.operator.shape)
     v = np.random.default_rng(0).standard_normal(problem.shape)
     v /= np.linalg.norm(v)
-    right, alphas, betas = [v.ravel()], [], []
+    right = [v.ravel()]
+    alphas: list[float] = []
+    betas: list[float] = []
     u = problem.forward(v)
     value = 0.0
     for _ in range(steps):
