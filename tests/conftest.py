@@ -22,3 +22,32 @@ def shared_data() -> Path:
 def mouse_scan(shared_data: Path) -> Path:
     """The real scan of a mouse by an iThera MSOT scanner: one frame at 700 nm."""
     return shared_data / "mouse_scan9" / "Scan_9.msot"
+
+
+@pytest.fixture(scope="session")
+def small_scan():
+    """A simulated scan of two frames that reconstructs in a moment: 48 detectors about a disc of 3 mm."""
+    from oatkit import Geometry, plugin
+    from oatkit.simulate import arc_detectors, disc, simulate_scan
+
+    geometry = Geometry(arc_detectors(48, 0.015, 270), 20e6, 400, start_time_s=2e-6, speed_of_sound_m_s=1500)
+    arc = plugin("forward_model", "arc")()
+    return simulate_scan(
+        lambda grid: disc(grid, radius_m=3e-3),
+        arc,
+        geometry=geometry,
+        field_of_view_m=10e-3,
+        pixels=91,
+        snr_db=20.0,
+        frames=2,
+    )
+
+
+@pytest.fixture(scope="session")
+def small_scan_file(small_scan, tmp_path_factory) -> Path:
+    """The same scan in a file."""
+    from oatkit.scanfile import write_scan
+
+    path = tmp_path_factory.mktemp("scan") / "small.h5"
+    write_scan(small_scan, path)
+    return path

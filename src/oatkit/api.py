@@ -7,6 +7,7 @@ another plugin.
 """
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -32,7 +33,7 @@ Weight = float | Literal["l-curve", "hold-out"]
 """Type of a solver's weight: a number above 0, or the rule of `oatkit.weights` that chooses it."""
 
 
-class Plugin(Parameters, ABC):  # type: ignore[metaclass]
+class Plugin(Parameters, ABC):
     """What all plugins are: a frozen set of parameters with a name, picklable and hashable."""
 
 
@@ -113,7 +114,7 @@ class Quadratic(Regularizer):
 
     @abstractmethod
     def operator(self, shape: tuple[int, int]) -> Any:
-        """Return L for images of `shape`: something with ``shape``, ``matvec`` and ``rmatvec``, as scipy's operators."""
+        """Return L for images of `shape`: something with ``shape``, ``matvec`` and ``rmatvec``, as in scipy."""
 
 
 class Solver(Plugin):
@@ -135,12 +136,10 @@ class Solver(Plugin):
 
     def solve(self, problem: Problem) -> Iterate:
         """Run to the end and return the last state."""
-        last = None
-        for last in self.iterate(problem):
-            pass
-        if last is None:
+        states = deque(self.iterate(problem), maxlen=1)
+        if not states:
             raise PluginError(f"solver '{self.name}' ended without yielding an image")
-        return last
+        return states[0]
 
 
 class Segmenter(Plugin):

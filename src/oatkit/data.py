@@ -159,7 +159,7 @@ class Detectors(ByContent):
             raise ValidationError(f"detector points: expected shape (n, 3) in the order (x, y, z), got {points.shape}")
         if not np.ptp(points[:, 2]) <= 1e-4:
             raise ValidationError(
-                f"detector points: z varies by {np.ptp(points[:, 2]) * 1e3:.3g} mm; only detectors in one plane are supported"
+                f"detector points: z varies by {np.ptp(points[:, 2]) * 1e3:.3g} mm; they must lie in one plane"
             )
         return cls(points[:, [1, 0]])
 
@@ -225,13 +225,14 @@ class Geometry(ByContent):
         if inside:
             raise ValidationError(
                 f"grid: {inside} of {self.detectors.count} detectors lie inside the field of view of "
-                f"{1e3 * (right - left):.4g} x {1e3 * (top - bottom):.4g} mm; take a smaller field of view (the unit is mm)"
+                f"{1e3 * (right - left):.4g} x {1e3 * (top - bottom):.4g} mm; take a smaller one (the unit is mm)"
             )
         first, last = self.times_s[[0, -1]] * self.speed_of_sound_m_s
         if not ((far >= first) & (near <= last)).any():
             raise ValidationError(
-                f"grid: the record reaches distances of {1e3 * first:.4g} .. {1e3 * last:.4g} mm, but the field of view is "
-                f"{1e3 * near.min():.4g} .. {1e3 * far.max():.4g} mm from the detectors; check its centre and the start time"
+                f"grid: the record reaches distances of {1e3 * first:.4g} .. {1e3 * last:.4g} mm, but the field of "
+                f"view is {1e3 * near.min():.4g} .. {1e3 * far.max():.4g} mm from the detectors; "
+                "check its centre and the start time"
             )
 
 
@@ -328,6 +329,10 @@ class Scan(ByContent):
         parts = {k: v[one] for k in per_frame if (v := getattr(self, k)) is not None}
         return replace(self, signals=np.asarray(self.signals[one]), **parts)
 
+    def with_start_time(self, start_time_s: float) -> "Scan":
+        """Return the same scan with another time of the first sample, s."""
+        return replace(self, geometry=replace(self.geometry, start_time_s=start_time_s))
+
     def with_speed_of_sound(self, speed_of_sound_m_s: float, source: str) -> "Scan":
         """Return the same scan with another speed of sound (m/s) and where it came from."""
         geometry = replace(self.geometry, speed_of_sound_m_s=speed_of_sound_m_s)
@@ -374,6 +379,9 @@ class Image(ByContent):
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "history": tuple(dict(step) for step in self.history)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__({**state, "history": tuple(_frozen(step) for step in state["history"])})
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,14 +8,20 @@ import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, get_args, get_origin
 
 import pydantic
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_serializer
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_serializer, model_validator
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from oatkit.errors import ValidationError
+from oatkit.errors import OatkitError, ValidationError
+from oatkit.names import did_you_mean
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
 
 
 @dataclass(frozen=True)
@@ -58,8 +64,8 @@ def param(
     The value is held in `unit` everywhere (Python, pipeline file, GUI); the method converts to SI. Bounds apply to
     numbers, each one of a tuple; where a field also takes words, they are left alone.
     """
-    bounds = Bounds(unit, above, at_least, below, at_most)
-    return Field(default, description=text, json_schema_extra={"oatkit": bounds})
+    extra: Any = {"oatkit": Bounds(unit, above, at_least, below, at_most)}
+    return Field(default, description=text, json_schema_extra=extra)
 
 
 def bounds_of(field: FieldInfo) -> Bounds:
@@ -78,21 +84,30 @@ def _describe(annotation: Any, bounds: Bounds) -> str:
     limits = f" {bounds}" if str(bounds) else (f" ({bounds.unit})" if bounds.unit else "")
     origin, args = get_origin(annotation), get_args(annotation)
     if origin in (Union, types.UnionType):
-        return " or ".join(_describe(arg, bounds) for arg in args)
+        return " or ".join(_describe(arg, bounds) for arg in args if arg is not type(None))
     if origin is Literal:
-        return " or ".join(f'"{word}"' for word in args)
+        return " or ".join(_shown(word) for word in args)
     if origin is tuple:
         count = "a list of" if Ellipsis in args else f"a list of {len(args)}"
+        if isinstance(args[0], type) and issubclass(args[0], Parameters):
+            return f"{count} {_called(args[0])}s"
         return f"{count} {'whole ' if args[0] is int else ''}numbers{limits}"
     if isinstance(annotation, type) and issubclass(annotation, Parameters):
-        return f"a {annotation.__name__} plugin"
+        return f"a {_called(annotation)}"
     words = {bool: "true or false", str: "a text", Path: "a path"}
     numbers = {float: "a number", int: "a whole number"}
     return words.get(annotation) or numbers.get(annotation, str(annotation)) + limits
 
 
+def _called(cls: "type[Parameters]") -> str:
+    """Return what a message calls a class: ``forward model``, ``quadratic regularizer``, ``table``."""
+    kind = cls.kind.replace("_", " ")
+    word = cls.__name__.lower()
+    return kind if word == kind.replace(" ", "") else f"{word} {kind}" if kind else "table"
+
+
 def part_of(field: FieldInfo) -> "type[Parameters] | None":
-    """Return the ability that a field asks of a plugin put into it; None for an ordinary parameter."""
+    """Return the class that a field asks of what is put into it, or of each in its list; None for a plain parameter."""
     for annotation in (field.annotation, *get_args(field.annotation)):
         if isinstance(annotation, type) and issubclass(annotation, Parameters):
             return annotation
@@ -109,14 +124,15 @@ class Context:
     """Paths are relative to this one."""
 
 
-class _OurErrors(type(BaseModel)):  # type: ignore[misc]
+class _OurErrors(ModelMetaclass):
     """Turns what pydantic raises on ``Plugin(...)`` into the one exception tree of this package."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         try:
             return super().__call__(*args, **kwargs)
         except pydantic.ValidationError as error:
-            raise ValidationError("\n".join(f"{cls.__name__}{p}" for p in problems(error, cls))) from None  # type: ignore[arg-type]
+            where = cls.__name__
+            raise ValidationError("\n".join(f"{where}{key}: {text}" for key, text in problems(error))) from None
 
 
 class Parameters(BaseModel, metaclass=_OurErrors):
@@ -126,6 +142,24 @@ class Parameters(BaseModel, metaclass=_OurErrors):
 
     kind: ClassVar[str] = ""
     name: ClassVar[str] = ""
+    key_word: ClassVar[str] = "parameter"
+    """What a message calls a key of this table."""
+    title: ClassVar[str] = "this table"
+    """What a message calls the table, where it is no plugin with a name."""
+
+    @classmethod
+    def _title(cls) -> str:
+        return f"'{cls.name}'" if cls.name else cls.title
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _explain(cls, data: Any, handler: Any) -> Any:
+        """Say of each unknown or missing key what was meant, while it is known whose key it is."""
+        try:
+            return handler(data)
+        except pydantic.ValidationError as error:
+            lines = [_in_our_words(detail, cls) for detail in error.errors()]
+            raise pydantic.ValidationError.from_exception_data(cls.__name__, lines) from None
 
     @field_validator("*", mode="wrap")
     @classmethod
@@ -136,6 +170,8 @@ class Parameters(BaseModel, metaclass=_OurErrors):
             value = tuple(value)
         if (ability := part_of(field)) and isinstance(value, Mapping):
             value = _part(ability, field.default, value, context)
+        elif ability and isinstance(value, tuple):
+            value = _parts(ability, value, context)
         elif field.annotation is Path and isinstance(value, str):
             value = (context.folder if context else Path()) / value
         try:
@@ -166,18 +202,41 @@ def _plain(value: Any) -> Any:
 def _part(ability: type[Parameters], default: Any, table: Mapping[str, Any], context: Context | None) -> Parameters:
     """Make the plugin that a nested table describes; without ``use`` it is the field's own."""
     parameters = {k: v for k, v in table.items() if k != "use"}
-    use = table.get("use")
-    if use is None:
-        chosen, parameters = type(default), {**default.model_dump(exclude={"use"}), **parameters}
+    chosen = ability if not ability.kind else _used(ability, default, table.get("use"), context)
+    if isinstance(default, chosen):
+        parameters = {**default.model_dump(), **parameters}
         parameters.pop("use", None)
-    elif context is None:
-        raise PydanticCustomError("oatkit", "must be a plugin object here, got a table")
-    else:
-        try:
-            chosen = context.find(ability.kind, use)
-        except Exception as error:
-            raise PydanticCustomError("oatkit", "{text}", {"text": str(error)}) from None
     return chosen.model_validate(parameters, context=context)
+
+
+def _used(ability: type[Parameters], default: Any, use: Any, context: Context | None) -> type[Parameters]:
+    """Return the class that ``use`` names; without it, the class of the field's own plugin."""
+    if use is None and isinstance(default, Parameters):
+        return type(default)
+    if context is None:
+        raise PydanticCustomError("oatkit", "must be a plugin object here, got a table")
+    if not isinstance(use, str):
+        kind = ability.kind.replace("_", " ")
+        raise PydanticCustomError("oatkit", "{text}", {"text": f'needs use = "...", the name of a {kind}'})
+    try:
+        return context.find(ability.kind, use)
+    except OatkitError as error:
+        raise PydanticCustomError("oatkit", "{text}", {"text": str(error)}) from None
+
+
+def _parts(ability: type[Parameters], tables: tuple[Any, ...], context: Context | None) -> tuple[Any, ...]:
+    """Make the plugins of a list of tables; all that is wrong is reported together, under ``0``, ``1``, ..."""
+    made, wrong = [], []
+    for index, table in enumerate(tables):
+        try:
+            made.append(_part(ability, None, table, context) if isinstance(table, Mapping) else table)
+        except pydantic.ValidationError as error:
+            wrong += [_in_our_words({**d, "loc": (index, *d["loc"])}, ability) for d in error.errors()]
+        except PydanticCustomError as error:
+            wrong.append(InitErrorDetails(type=error, loc=(index,), input=table))
+    if wrong:
+        raise pydantic.ValidationError.from_exception_data(ability.__name__, wrong)
+    return tuple(made)
 
 
 def _not_what_was_expected(field: FieldInfo, value: Any) -> PydanticCustomError:
@@ -193,18 +252,19 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def problems(error: pydantic.ValidationError, cls: type[Parameters]) -> list[str]:
-    """Write each error of a failed validation as ``.key: sentence``, with the nearest known name where one is unknown."""
-    return [_sentence(detail, cls) for detail in error.errors()]
+def problems(error: pydantic.ValidationError) -> list[tuple[str, str]]:
+    """Return the path (``.key.key``) and a sentence for each error of a failed validation."""
+    return [("".join(f".{key}" for key in detail["loc"]), detail["msg"]) for detail in error.errors()]
 
 
-def _sentence(detail: Any, cls: type[Parameters]) -> str:
-    from oatkit.names import did_you_mean  # only needed where something is wrong
-
-    path = "".join(f".{key}" for key in detail["loc"])
+def _in_our_words(detail: Any, cls: type[Parameters]) -> InitErrorDetails:
+    """Rewrite one of pydantic's errors; those of nested tables have been rewritten where they arose."""
+    text, path = detail["msg"], detail["loc"]
     if detail["type"] == "extra_forbidden":
-        owner = f"'{cls.name}'" if cls.name else "this table"
-        key = str(detail["loc"][-1])
-        known = list(cls.model_fields) if len(detail["loc"]) == 1 else []
-        return f"{path}: {owner} has no parameter '{key}'{did_you_mean(key, known)}"
-    return f"{path}: {detail['msg']}"
+        key = str(path[-1])
+        text = f"{cls._title()} has no {cls.key_word} '{key}'{did_you_mean(key, cls.model_fields)}"
+        path = path[:-1]
+    elif detail["type"] == "missing":
+        text = f"is missing: {cls._title()} needs {expected(cls.model_fields[path[-1]])}"
+    error = PydanticCustomError("oatkit", "{text}", {"text": text})
+    return InitErrorDetails(type=error, loc=path, input=detail["input"])

@@ -145,3 +145,8 @@ def _reason(error: BaseException) -> str:
     """Say in one line what an exception says."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def plugin(kind: str, name: str) -> type[Plugin]:
+    """Return the class of an installed plugin: ``plugin("solver", "maxent-nlcg")``. Raises as `Registry.find` does."""
+    return installed().find(kind, name)

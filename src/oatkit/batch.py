@@ -1,0 +1,47 @@
+"""Many frames through one pipeline, streamed into a result on disk."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from oatkit.data import Scan
+from oatkit.engine import Event, resolve, run_resolved
+from oatkit.errors import PluginError, SolverError, ValidationError
+from oatkit.memo import Memo
+from oatkit.pipeline import Pipeline
+from oatkit.result import Result
+from oatkit.store import StoreWriter, load
+
+
+def run_frames(
+    pipeline: Pipeline,
+    scan: Scan,
+    path: str | Path,
+    frames: Iterable[int] | None = None,
+    on_event: Callable[[Event], None] = lambda event: None,
+    on_frame: Callable[[int], None] = lambda frame: None,
+    overwrite: bool = False,
+) -> Result:
+    """Run `pipeline` over `frames` (all unless said) and return the result that now lies in the folder `path`.
+
+    The weight is chosen and the operator built once. A frame that fails is recorded with its reason and the rest goes
+    on. Raises `ValidationError` for a frame that does not exist, `ResultError` where the result cannot be written, and
+    the frame's own error where every frame failed; then nothing is left at `path`.
+    """
+    chosen = list(range(scan.frames) if frames is None else frames)
+    missing = [f for f in chosen if not 0 <= f < scan.frames]
+    if missing or not chosen:
+        raise ValidationError(f"frames {missing or chosen}: the scan has frames 0 .. {scan.frames - 1}")
+    with StoreWriter(path, frames=len(chosen), source=scan.source, overwrite=overwrite) as writer:
+        memo = Memo()
+        resolved, choice = resolve(pipeline, scan, memo)
+        failures = []
+        for index, frame in enumerate(chosen):
+            try:
+                writer.write(index, run_resolved(resolved, pipeline, choice, scan, frame, memo, on_event))
+            except (PluginError, SolverError) as error:
+                failures.append(error)
+                if len(failures) == len(chosen):
+                    raise
+                writer.fail(index, f"frame {frame}: {error}")
+            on_frame(frame)
+    return load(path)

@@ -1,0 +1,91 @@
+"""Plugins and scans described in words, from their own declarations."""
+
+import inspect
+from dataclasses import dataclass
+from typing import Any
+
+from oatkit.api import Plugin
+from oatkit.data import Scan
+from oatkit.parameters import Parameters, bounds_of, expected
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One parameter of a plugin."""
+
+    name: str
+    takes: str
+    """Type, range and unit in words."""
+    unit: str
+    default: str
+    """As a pipeline file writes it."""
+    meaning: str
+
+
+def parameter_rows(cls: type[Parameters]) -> list[ParameterRow]:
+    """Return the parameters of a plugin class in the order of their declaration."""
+    return [
+        ParameterRow(name, expected(f), bounds_of(f).unit, _default(f.default), f.description or "")
+        for name, f in cls.model_fields.items()
+    ]
+
+
+def plugin_text(cls: type[Plugin], origin: str) -> str:
+    """Return kind, name, docstring and a paragraph for each parameter of a plugin."""
+    lines = [f"{cls.kind.replace('_', ' ')} {cls.name}   ({origin})", "", inspect.cleandoc(cls.__doc__ or ""), ""]
+    rows = parameter_rows(cls)
+    lines.append("Parameters:" if rows else "It has no parameters.")
+    for row in rows:
+        lines += [f"  {row.name} = {row.default}", f"      {row.meaning}", f"      takes {row.takes}"]
+    return "\n".join(lines)
+
+
+def scan_table(scan: Scan) -> dict[str, Any]:
+    """Return what is known of a scan as plain values, for `info` and its JSON."""
+    geometry = scan.geometry
+    response = geometry.impulse_response
+    return {
+        "name": scan.name,
+        "reader": scan.reader,
+        "frames": scan.frames,
+        "wavelengths_nm": list(scan.wavelengths_nm),
+        "detectors": geometry.detectors.count,
+        "samples": geometry.n_samples,
+        "sampling_rate_hz": geometry.sampling_rate_hz,
+        "start_time_s": geometry.start_time_s,
+        "speed_of_sound_m_s": geometry.speed_of_sound_m_s,
+        "speed_of_sound_source": scan.speed_of_sound_source,
+        "impulse_response_samples": 0 if response is None else len(response),
+        "temperature_c": None if scan.temperature_c is None else float(scan.temperature_c.mean()),
+        "dtype": str(scan.signals.dtype),
+        "fingerprint": scan.fingerprint,
+        "notes": list(scan.notes),
+    }
+
+
+def scan_text(scan: Scan) -> str:
+    """Return what is known of a scan as lines for a reader's eyes."""
+    table = scan_table(scan)
+    temperature = table["temperature_c"]
+    rows = {
+        "scan": f"{table['name']} (reader {table['reader']})",
+        "frames": table["frames"],
+        "wavelengths": ", ".join(f"{w:g}" for w in table["wavelengths_nm"]) + " nm",
+        "detectors": table["detectors"],
+        "samples": f"{table['samples']} at {table['sampling_rate_hz'] / 1e6:g} MHz, {table['dtype']}",
+        "speed of sound": f"{table['speed_of_sound_m_s']:.1f} m/s ({table['speed_of_sound_source']})",
+        "temperature": "unknown" if temperature is None else f"{temperature:.2f} degrees Celsius",
+        "impulse response": f"{table['impulse_response_samples']} samples" if table["impulse_response_samples"] else "none",
+    }
+    lines = [f"{name:<18}{value}" for name, value in rows.items()]
+    return "\n".join([*lines, *(f"note: {note}" for note in table["notes"])])
+
+
+def _default(value: Any) -> str:
+    if isinstance(value, Parameters):
+        return f'"{value.name}"' if value.name else "{}"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, tuple):
+        return f"[{', '.join(_default(v) for v in value)}]"
+    return f'"{value}"' if isinstance(value, str) else "not set" if value is None else str(value)

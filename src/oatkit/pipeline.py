@@ -1,0 +1,191 @@
+"""A pipeline: which plugin does each step, with which parameters, as a frozen value that reads and writes TOML."""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Self
+
+import pydantic
+
+from oatkit.api import ForwardModel, Preprocessor, Segmenter, Solver, Unmixer
+from oatkit.data import Grid, Scan
+from oatkit.errors import ValidationError
+from oatkit.names import did_you_mean
+from oatkit.parameters import Context, Parameters, param, problems
+from oatkit.registry import installed
+
+
+class ScanTable(Parameters):
+    """The table ``[scan]``: what is known better than the file says."""
+
+    speed_of_sound_m_s: float | None = param(
+        None, "speed of sound, in place of the file's", unit="m/s", at_least=300, at_most=7000
+    )
+    start_time_us: float | None = param(
+        None, "time of the first sample after the light pulse, in place of the file's", unit="us"
+    )
+
+    def apply(self, scan: Scan) -> Scan:
+        """Return the scan with its values overridden."""
+        if self.speed_of_sound_m_s is not None:
+            scan = scan.with_speed_of_sound(self.speed_of_sound_m_s, "pipeline")
+        if self.start_time_us is not None:
+            scan = scan.with_start_time(self.start_time_us * 1e-6)
+        return scan
+
+
+class GridTable(Parameters):
+    """The table ``[grid]``: the square image to reconstruct."""
+
+    pixels: int = param(200, "pixels along each side", at_least=2, at_most=8192)
+    field_of_view_mm: float = param(25.0, "length of each side", unit="mm", above=0)
+    centre_mm: tuple[float, float] = param((0.0, 0.0), "middle of the image, (y, x)", unit="mm")
+
+    def grid(self) -> Grid:
+        """Return the grid in SI units. Raises `ValidationError` for pixels of an impossible size."""
+        y, x = self.centre_mm
+        return Grid((self.pixels, self.pixels), self.field_of_view_mm * 1e-3 / self.pixels, (y * 1e-3, x * 1e-3))
+
+
+class Pipeline(Parameters):
+    """The steps from a scan to images. A step that is None does not happen."""
+
+    key_word: ClassVar[str] = "table"
+    title: ClassVar[str] = "a pipeline"
+
+    version: Literal[1] = param(1, "version of the file format")
+    scan: ScanTable = param(ScanTable(), "overrides of what the scan file says")
+    grid: GridTable = param(GridTable(), "the image to reconstruct")
+    preprocess: tuple[Preprocessor, ...] = param((), "steps on the raw signals, in this order")
+    forward: ForwardModel = param(..., "acoustic model")
+    reconstruct: Solver = param(..., "from signals to initial pressure")
+    segment: Segmenter | None = param(None, "from initial pressure to the boundary of the body")
+    unmix: Unmixer | None = param(None, "from wavelengths to chromophores")
+
+    @classmethod
+    def load(cls, name_or_path: str | Path, changes: Iterable[str] = ()) -> Self:
+        """Read a pipeline file (``*.toml``) or a preset by its name, with ``slot.key=value`` changes.
+
+        Raises `ValidationError` with all that is wrong in it, one sentence a line.
+        """
+        text, origin, folder = _source(str(name_or_path))
+        return cls.loads(text, origin, folder, changes)
+
+    @classmethod
+    def loads(cls, text: str, origin: str = "pipeline", folder: Path = Path(), changes: Iterable[str] = ()) -> Self:
+        """Read a pipeline from TOML text; `origin` names it in messages, paths in it are relative to `folder`."""
+        try:
+            table = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise ValidationError(f"{origin}: not valid TOML: {error}") from None
+        for change in changes:
+            set_value(table, change)
+        try:
+            return cls.model_validate(table, context=Context(installed().find, folder))
+        except pydantic.ValidationError as error:
+            lines = [f"{origin}{_where(path, table)}: {text}" for path, text in problems(error)]
+            raise ValidationError("\n".join(lines)) from None
+
+    def to_toml(self) -> str:
+        """Return the pipeline as TOML text with every parameter; `loads` gives back an equal pipeline."""
+        import tomlkit  # only needed to write
+
+        return tomlkit.dumps(_without_none(self.model_dump()))
+
+    def save(self, path: str | Path) -> None:
+        """Write the pipeline as a TOML file."""
+        Path(path).write_text(self.to_toml(), encoding="utf-8")
+
+    def with_solver(self, solver: Solver) -> Self:
+        """Return the same pipeline with another solver."""
+        return self.model_copy(update={"reconstruct": solver})
+
+
+def presets() -> dict[str, str]:
+    """Return the text of each pipeline that ships with the package, by its name."""
+    found = (f for f in files("oatkit.presets").iterdir() if f.name.endswith(".toml"))
+    return {f.name.removesuffix(".toml"): f.read_text(encoding="utf-8") for f in sorted(found, key=lambda f: f.name)}
+
+
+def preset(name: str) -> str:
+    """Return the text of a preset. Raises `ValidationError`, with the nearest name, where there is none."""
+    known = presets()
+    if name not in known:
+        hint = did_you_mean(name, known)
+        raise ValidationError(f"no preset named '{name}'{hint} (a pipeline file ends in .toml)")
+    return known[name]
+
+
+def set_value(table: dict[str, Any], change: str) -> None:
+    """Apply ``slot.key=value`` to a pipeline's table in place.
+
+    The right side is read as a TOML value, else as a bare word. A step of ``preprocess`` is addressed by its plugin's
+    name. A change of ``use`` drops the other keys of the old plugin. Raises `ValidationError`.
+    """
+    path, equals, text = change.partition("=")
+    keys = path.strip().split(".")
+    if not equals or len(keys) < 2 or not all(keys):
+        raise ValidationError(f"--set {change}: expected slot.key=value, as in reconstruct.weight=0.01")
+    for key in keys[:-1]:
+        table = _descend(table, key, change)
+    if keys[-1] == "use":
+        table.clear()
+    table[keys[-1]] = _value(text.strip())
+
+
+def _descend(table: Any, key: str, change: str) -> Any:
+    if isinstance(table, list):
+        steps = {step.get("use"): step for step in table if isinstance(step, dict)}
+        if key not in steps:
+            hint = did_you_mean(key, (str(name) for name in steps))
+            raise ValidationError(f"--set {change}: the pipeline has no step '{key}' there{hint}")
+        return steps[key]
+    below = table.setdefault(key, {})
+    if isinstance(below, str):
+        # A plugin named by its bare word becomes a table that can take keys.
+        below = table[key] = {"use": below}
+    if not isinstance(below, dict | list):
+        raise ValidationError(f"--set {change}: '{key}' is a value, not a table")
+    return below
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _source(name_or_path: str) -> tuple[str, str, Path]:
+    """Return text, name for messages and folder of a pipeline."""
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        return preset(name_or_path), name_or_path, Path()
+    try:
+        return path.read_text(encoding="utf-8"), path.name, path.parent
+    except FileNotFoundError:
+        raise ValidationError(f"{path}: no such pipeline file") from None
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise ValidationError(f"{path}: not a readable text file: {error}") from None
+
+
+def _where(path: str, table: Mapping[str, Any]) -> str:
+    """Write ``.reconstruct.weight`` as `` [reconstruct].weight``; a preprocess step is named by its plugin."""
+    keys = path.split(".")[1:]
+    if not keys:
+        return ""
+    if len(keys) == 1 and not isinstance(table.get(keys[0]), dict | list) and keys[0] in table:
+        return f" {keys[0]}"
+    head, rest = keys[0], keys[1:]
+    if rest and rest[0].isdigit():
+        step = table[head][int(rest[0])]
+        name = step.get("use", rest[0]) if isinstance(step, dict) else rest[0]
+        head, rest = f"{head}.{name}", rest[1:]
+    return f" [{head}]" + "".join(f".{key}" for key in rest)
+
+
+def _without_none(table: Any) -> Any:
+    if isinstance(table, dict):
+        return {k: _without_none(v) for k, v in table.items() if v is not None}
+    return [_without_none(v) for v in table] if isinstance(table, list) else table

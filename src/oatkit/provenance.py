@@ -1,0 +1,31 @@
+"""Which versions of what made a result."""
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+from oatkit.api import Plugin
+from oatkit.pipeline import Pipeline
+from oatkit.registry import installed
+
+LIBRARIES = ("oatkit", "numpy", "scipy", "numba", "scikit-image", "h5py", "zarr", "pydantic", "pluggy")
+"""Packages whose version can change a number or a file."""
+
+
+def versions(pipeline: Pipeline) -> dict[str, str]:
+    """Return the version of Python, the platform, each library, and each distribution with a plugin in `pipeline`."""
+    used = {type(step) for step in _plugins(pipeline)}
+    foreign = {e.distribution: e.version for e in installed().entries if e.cls in used}
+    found = {name: known for name in LIBRARIES if (known := _version(name))}
+    return {"python": platform.python_version(), "platform": platform.platform(), **foreign, **found}
+
+
+def _plugins(pipeline: Pipeline) -> list[Plugin]:
+    slots = (pipeline.forward, pipeline.reconstruct, pipeline.segment, pipeline.unmix)
+    return [*pipeline.preprocess, *(step for step in slots if step is not None)]
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None

@@ -1,0 +1,153 @@
+"""The command line as a process: what it prints, what it leaves, and how it exits."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from packages import run_oatkit
+
+import oatkit
+
+SMALL = ("--set", "grid.pixels=32", "--set", "grid.field_of_view_mm=9")
+COMMANDS = ("demo", "info", "run", "pipeline", "plugins", "describe", "simulate", "export", "verify")
+
+
+@pytest.fixture(scope="module")
+def stored(small_scan_file, tmp_path_factory):
+    """A result made by `oatkit run` as a process."""
+    out = tmp_path_factory.mktemp("cli") / "out.zarr"
+    done = run_oatkit("run", "lsqr", str(small_scan_file), "-o", str(out), *SMALL)
+    assert done.returncode == 0, done.stderr
+    return out, done.stdout
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_explains_itself(name):
+    """Each command has a help text that begins with a sentence, and exits with 0."""
+    done = run_oatkit(name, "--help")
+    assert done.returncode == 0
+    sentence = done.stdout.split("\n\n")[1].strip()
+    assert sentence[0].isupper()
+    assert sentence.rstrip().endswith(".")
+
+
+def test_run_writes_a_result_and_says_what_is_in_it(stored):
+    """`run` reports each image with its negative pixels, and the folder opens in Python."""
+    out, text = stored
+    assert "pixels negative" in text
+    assert "speed of sound 1500.0 m/s (simulation)" in text
+    assert oatkit.load(out)["initial_pressure"].values.shape == (1, 32, 32)
+
+
+def test_the_command_line_gives_the_numbers_of_the_script(stored, small_scan_file):
+    """The same pipeline from the command line and from Python is equal to the last bit."""
+    pipeline = oatkit.Pipeline.load("lsqr", ["grid.pixels=32", "grid.field_of_view_mm=9"])
+    result = oatkit.run(pipeline, oatkit.read(small_scan_file))
+    assert (oatkit.load(stored[0])["initial_pressure"].values == result["initial_pressure"].values).all()
+
+
+def test_info_tells_what_a_scan_holds(small_scan_file):
+    """`info --json` has the promised keys; the text names the source of the speed of sound."""
+    table = json.loads(run_oatkit("info", str(small_scan_file), "--json").stdout)
+    assert table["frames"] == 2
+    assert table["wavelengths_nm"] == [700.0]
+    assert (table["detectors"], table["samples"], table["sampling_rate_hz"]) == (48, 400, 20e6)
+    assert table["speed_of_sound_m_s"] == 1500.0
+    assert "(simulation)" in run_oatkit("info", str(small_scan_file)).stdout
+
+
+def test_a_preset_printed_is_a_pipeline_that_runs(tmp_path):
+    """What `pipeline maxent` prints is a file that loads as the preset."""
+    path = tmp_path / "mine.toml"
+    path.write_text(run_oatkit("pipeline", "maxent").stdout)
+    assert oatkit.Pipeline.load(path) == oatkit.Pipeline.load("maxent")
+
+
+def test_describe_shows_type_unit_range_and_default():
+    """`describe` prints each parameter with its default, meaning, range and unit, and a reference."""
+    text = run_oatkit("describe", "band-pass").stdout
+    assert "high = 7.0" in text
+    assert "MHz" in text
+    assert "Prakash" in run_oatkit("describe", "maxent-nlcg").stdout
+
+
+@pytest.mark.parametrize("suffix", [".png", ".ome.tif", ".h5"])
+def test_export_writes_each_format(stored, tmp_path, suffix):
+    """`export` writes a figure, an OME-TIFF and an HDF5 file, and refuses to replace one unasked."""
+    file = tmp_path / f"picture{suffix}"
+    assert run_oatkit("export", str(stored[0]), str(file)).returncode == 0
+    assert file.stat().st_size > 1000
+    again = run_oatkit("export", str(stored[0]), str(file))
+    assert again.returncode in (1, 2)
+    assert "exists" in again.stderr
+    assert run_oatkit("export", str(stored[0]), str(file), "--overwrite").returncode == 0
+
+
+def test_verify_finds_a_flipped_bit(stored, tmp_path):
+    """`verify` exits with 0 for a sound result and with 4 for one with a flipped bit."""
+    import shutil
+
+    copy = tmp_path / "copy.zarr"
+    shutil.copytree(stored[0], copy)
+    assert run_oatkit("verify", str(copy)).returncode == 0
+    chunk = max((p for p in copy.rglob("*") if p.is_file()), key=lambda p: p.stat().st_size)
+    data = bytearray(chunk.read_bytes())
+    data[len(data) // 2] ^= 1
+    chunk.write_bytes(data)
+    done = run_oatkit("verify", str(copy))
+    assert done.returncode == 4
+    assert chunk.name in done.stderr
+
+
+BAD_CALLS = {
+    "no such command": (["dem"], 2),
+    "no such scan": (["info", "nowhere.msot"], 4),
+    "a text file": (["info", "text.txt"], 4),
+    "an empty scan": (["info", "empty.msot"], 4),
+    "a folder that is no result": (["verify", "."], 4),
+    "export of nothing": (["export", "nowhere.zarr", "x.png"], 4),
+    "no such preset": (["run", "maxnt", "SCAN", "-o", "x.zarr"], 2),
+    "no such key": (["run", "maxent", "SCAN", "-o", "x.zarr", "--set", "reconstruct.wieght=1"], 2),
+    "not a number": (["run", "maxent", "SCAN", "-o", "x.zarr", "--set", "grid.pixels=nan"], 2),
+    "grid over the detectors": (["run", "maxent", "SCAN", "-o", "x.zarr", "--set", "grid.field_of_view_mm=40"], 2),
+    "no such frame": (["run", "maxent", "SCAN", "-o", "x.zarr", "--frames", "9"], 2),
+    "output exists": (["run", "maxent", "SCAN", "-o", "text.txt"], 2),
+    "no such plugin": (["describe", "maxnt"], 2),
+    "unknown suffix": (["export", "RESULT", "x.bmp"], 2),
+}
+
+
+@pytest.mark.parametrize("what", BAD_CALLS)
+def test_bad_input_gets_a_sentence_and_an_exit_code(what, small_scan_file, stored, tmp_path):
+    """Each wrong call ends with the promised exit code, a sentence on stderr, no traceback, and no file left behind."""
+    arguments, code = BAD_CALLS[what]
+    (tmp_path / "text.txt").write_text("hello")
+    (tmp_path / "empty.msot").write_text("")
+    real = {"SCAN": str(small_scan_file), "RESULT": str(stored[0])}
+    done = run_oatkit(*(real.get(a, a) for a in arguments), cwd=tmp_path)
+    assert done.returncode == code, done.stderr
+    assert done.stderr.strip()
+    assert "Traceback" not in done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["empty.msot", "text.txt"]
+
+
+def test_ctrl_c_ends_a_run_and_leaves_nothing(small_scan_file, tmp_path):
+    """An interrupt ends a long run within seconds with exit code 130 and no file under any name."""
+    code = "from oatkit.cli import main; main()"
+    long = ["--set", "grid.pixels=512", "--set", "reconstruct.n_iterations=100000", "--set", "reconstruct.tolerance=1e-15"]
+    command = [sys.executable, "-c", code, "run", "nnls", str(small_scan_file), "-o", "out.zarr", *SMALL[2:], *long]
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
+    time.sleep(12)
+    assert process.poll() is None, "the run ended before it could be interrupted"
+    process.send_signal(signal.SIGINT)
+    start = time.perf_counter()
+    _, errors = process.communicate(timeout=30)
+    assert time.perf_counter() - start < 5
+    assert process.returncode == 130
+    assert "interrupted" in errors
+    assert "Traceback" not in errors
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,84 @@
+"""The layout's promise: imports run one way, and what is heavy is loaded only when it is needed."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import oatkit
+
+SOURCE = Path(oatkit.__file__).parent
+
+HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg", "h5py", "skimage", "tifffile", "typer")
+
+ORDER = [
+    {"errors", "names"},
+    {"data"},
+    {"parameters"},
+    {"problem"},
+    {"api"},
+    {"masking", "threads", "memo", "metrics", "hostile", "hookspecs"},
+    {"weights", "registry", "scanfile"},
+    {"pipeline", "reading", "simulate"},
+    {"provenance", "result"},
+    {"engine", "store", "figure", "describe"},
+    {"batch", "export", "summary", "progress"},
+    {"demo"},
+    {"cli"},
+]
+"""Layers of modules from the ground up: a module imports only from layers below its own, or its own."""
+
+FOR_BUILTINS = {"api", "data", "errors", "problem", "scanfile", "hostile", "threads", "masking", "spectra"}
+
+
+def imported(path: Path) -> set[str]:
+    """The oatkit modules that a file imports anywhere in it, by their first name below the package."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "oatkit":
+            parts = node.module.split(".")[1:]
+            found |= {parts[0]} if parts else {alias.name for alias in node.names}
+        elif isinstance(node, ast.Import):
+            found |= {a.name.split(".")[1] for a in node.names if a.name.startswith("oatkit.")}
+    return found
+
+
+def module_of(path: Path) -> str:
+    """The first name of a file's module below the package."""
+    return path.relative_to(SOURCE).parts[0].removesuffix(".py")
+
+
+@pytest.mark.parametrize("path", sorted(SOURCE.rglob("*.py")), ids=lambda p: str(p.relative_to(SOURCE)))
+def test_imports_run_one_way(path):
+    """A module imports only from its own layer or below; nobody imports `builtin`, which imports only what is its."""
+    module = module_of(path)
+    if module == "__init__":
+        return
+    names = imported(path) - {module}
+    if module == "builtin":
+        assert names <= FOR_BUILTINS
+        return
+    layer = {name: level for level, names_ in enumerate(ORDER) for name in names_}
+    assert module in layer, f"{module} has no layer: give it one in ORDER"
+    assert "builtin" not in names
+    assert all(layer[name] <= layer[module] for name in names), {n: layer[n] for n in names if layer[n] > layer[module]}
+
+
+def loaded_after(code: str) -> set[str]:
+    """Which heavy modules a fresh interpreter holds after running `code`."""
+    script = f"{code}\nimport sys\nprint(*[m for m in {HEAVY!r} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_importing_oatkit_loads_nothing_heavy():
+    """`import oatkit` pays for no library that is not needed yet."""
+    assert loaded_after("import oatkit") == set()
+
+
+def test_declaring_plugins_loads_nothing_heavy():
+    """Listing every installed plugin and loading a preset pays for no library that is not needed yet."""
+    code = "import oatkit; from oatkit.registry import installed; installed(); oatkit.Pipeline.load('maxent')"
+    assert loaded_after(code) == set()
