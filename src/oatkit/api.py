@@ -21,8 +21,8 @@ from oatkit.parameters import Parameters, param
 from oatkit.problem import Iterate, Problem, Reference, UnmixProblem
 
 __all__ = [
-    "KINDS", "Detectors", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image", "Iterate", "OatkitError", "Optics",
-    "Plugin", "PluginError", "Preprocessor", "Problem", "Proximable", "Quadratic", "ReadError", "Reader", "Reference",
+    "KINDS", "Detectors", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image", "Iterate", "OatkitError",
+    "Optics", "Plugin", "PluginError", "Preprocessor", "Problem", "Proximable", "Quadratic", "ReadError", "Reader", "Reference",
     "Regularizer", "Scan", "Segmenter", "Signals", "Smooth", "Solver", "SolverError", "UnmixProblem", "Unmixer",
     "ValidationError", "Weight", "hookimpl", "param",
 ]  # fmt: skip
@@ -75,7 +75,8 @@ class ForwardModel(Plugin):
     def operator(self, geometry: Geometry, grid: Grid) -> Any:
         """Return a scipy ``LinearOperator`` from the raveled image (y, x) to the raveled record (detector, sample).
 
-        ``rmatvec`` is its exact adjoint. Raises `ValidationError` where the grid cannot be seen.
+        ``rmatvec`` is its exact adjoint. An operator that holds much memory says so in ``nbytes``. Raises
+        `ValidationError` where the grid cannot be seen.
         """
 
 

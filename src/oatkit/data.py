@@ -211,21 +211,26 @@ class Geometry(ByContent):
         """Time of each sample after the light pulse, shape ``(sample,)``, s."""
         return read_only(self.start_time_s + np.arange(self.n_samples) / self.sampling_rate_hz)
 
+    def reach(self, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+        """Return the distance of each detector from the nearest and the farthest point of `grid`, m."""
+        left, right, bottom, top = grid.extent_m
+        y, x = self.detectors.positions_m.T
+        near = np.hypot(np.maximum(np.maximum(bottom - y, y - top), 0), np.maximum(np.maximum(left - x, x - right), 0))
+        far = np.hypot(np.maximum(abs(y - bottom), abs(y - top)), np.maximum(abs(x - left), abs(x - right)))
+        return near, far
+
     def check_grid(self, grid: Grid) -> None:
         """Raise `ValidationError` where no image on `grid` could be seen by these detectors.
 
         That is: a detector lies on or inside the grid, or no sample of the record reaches any pixel.
         """
-        left, right, bottom, top = grid.extent_m
-        y, x = self.detectors.positions_m.T
-        # Distance from each detector to the nearest and to the farthest point of the grid.
-        near = np.hypot(np.maximum(np.maximum(bottom - y, y - top), 0), np.maximum(np.maximum(left - x, x - right), 0))
-        far = np.hypot(np.maximum(abs(y - bottom), abs(y - top)), np.maximum(abs(x - left), abs(x - right)))
+        near, far = self.reach(grid)
+        height, width = (1e3 * n * grid.pixel_size_m for n in grid.shape)
         inside = int((near <= grid.pixel_size_m).sum())
         if inside:
             raise ValidationError(
                 f"grid: {inside} of {self.detectors.count} detectors lie inside the field of view of "
-                f"{1e3 * (right - left):.4g} x {1e3 * (top - bottom):.4g} mm; take a smaller one (the unit is mm)"
+                f"{height:.4g} x {width:.4g} mm; take a smaller one (the unit is mm)"
             )
         first, last = self.times_s[[0, -1]] * self.speed_of_sound_m_s
         if not ((far >= first) & (near <= last)).any():

@@ -158,7 +158,9 @@ def problems(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iterato
     operator = memo.get(key, lambda: pipeline.forward.operator(clean.geometry, grid), _operator_bytes)
     expected = (clean.geometry.detectors.count * clean.geometry.n_samples, grid.shape[0] * grid.shape[1])
     if tuple(operator.shape) != expected:
-        raise PluginError(f"forward model '{pipeline.forward.name}': operator of shape {operator.shape}, not {expected}")
+        raise PluginError(
+            f"forward model '{pipeline.forward.name}': operator of shape {operator.shape}, not {expected}"
+        )
     signals = np.asarray(clean.signals)[0]
     for wavelength, record, valid in zip(clean.wavelengths_nm, signals, clean.valid[0], strict=True):
         rows = np.repeat(valid, clean.geometry.n_samples)
@@ -228,7 +230,13 @@ def _reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Ite
         norms.append(float(np.linalg.norm(problem.data)))
     values = np.stack([state.image for state in last]).astype(np.float32)
     image = Image(
-        values, "initial_pressure", "a.u.", grid, clean.wavelengths_nm, history_of(pipeline), _diagnose(values, last, norms)
+        values,
+        "initial_pressure",
+        "a.u.",
+        grid,
+        clean.wavelengths_nm,
+        history_of(pipeline),
+        _diagnose(values, last, norms),
     )
     yield {"initial_pressure": image}
 
@@ -283,7 +291,9 @@ def _single(name: str, plugin: Any, images: dict[str, Image]) -> Iterator[dict[s
     history = {"step": name, **plugin.model_dump()}
     for key, image in made.items():
         if not isinstance(image, Image) or image.grid != pressure.grid:
-            raise PluginError(f"{plugin.kind.replace('_', ' ')} '{plugin.name}' returned no image on the grid as '{key}'")
+            raise PluginError(
+                f"{plugin.kind.replace('_', ' ')} '{plugin.name}' returned no image on the grid as '{key}'"
+            )
         made[key] = replace(image, history=(*pressure.history, history))
     yield made
 
@@ -297,6 +307,5 @@ def _scan_bytes(scan: Scan) -> int:
 
 
 def _operator_bytes(operator: Any) -> int:
-    """Tell the memory that an operator holds, where it says so: a sparse matrix does, a matrix-free one has little."""
-    matrix = getattr(operator, "A", None)
-    return sum(getattr(matrix, part).nbytes for part in ("data", "indices", "indptr") if hasattr(matrix, part))
+    """Tell the memory that an operator says it holds; one without a matrix holds little and need not say."""
+    return int(getattr(operator, "nbytes", 0))

@@ -71,10 +71,7 @@ def useful_window(geometry: Geometry, grid: Grid) -> np.ndarray:
     It is pure geometry: those at distances between the nearest and the farthest point of the grid from the detector.
     The ringing of an impulse response may go beyond.
     """
-    left, right, bottom, top = grid.extent_m
-    y, x = geometry.detectors.positions_m.T
-    near = np.hypot(np.maximum(np.maximum(bottom - y, y - top), 0), np.maximum(np.maximum(left - x, x - right), 0))
-    far = np.hypot(np.maximum(abs(y - bottom), abs(y - top)), np.maximum(abs(x - left), abs(x - right)))
+    near, far = geometry.reach(grid)
     distance = geometry.times_s * geometry.speed_of_sound_m_s
     return (distance >= near[:, None]) & (distance <= far[:, None])
 
