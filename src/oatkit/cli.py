@@ -204,7 +204,7 @@ def simulate(
     if output.exists() and not overwrite:
         raise ValidationError(f"{output}: already exists; choose another name or add --overwrite")
     scan, truth = simulated(phantom.value, snr, seed)
-    write_scan(scan, output, truth)
+    write_scan(scan, output, truth, overwrite=overwrite)
     typer.echo(f"wrote {output}: {phantom.value} phantom, {snr:g} dB, seed {seed}")
 
 

@@ -1,0 +1,62 @@
+"""The electrical impulse response beside or inside an iThera header."""
+
+import base64
+import binascii
+from pathlib import Path
+
+import numpy as np
+
+from oatkit.builtin.readers.xml_fields import Node, local_name
+from oatkit.errors import ReadError
+from oatkit.hostile import inside, read_at_most
+
+FLAG = 1000.0
+"""Added to the first value by the vendor's software."""
+
+
+def impulse_response(header: Node, msot: Path, n_samples: int) -> tuple[np.ndarray | None, str]:
+    """Return the response, time zero at index ``n // 2``, with a note; None where there is none.
+
+    It is taken from the file ``.irf``, or else from the header itself (version 2.4), and scaled so that the largest
+    magnitude of its spectrum is 1: the vendor's unit is unknown, and so images made with and without it have one scale.
+    Raises `ReadError` where it does not hold one finite number for each of `n_samples`.
+    """
+    content, origin = _content(header, msot, 8 * n_samples)
+    if content is None:
+        return None, "There is no impulse response beside or in the header: signals are taken as the ideal ones."
+    if len(content) != 8 * n_samples:
+        raise ReadError(f"{origin}: expected {8 * n_samples} bytes of impulse response, found {len(content)}")
+    values = np.frombuffer(content, "<f8").copy()
+    if values[0] >= FLAG:
+        values[0] -= FLAG
+    scale = _largest_magnitude(values, origin)
+    centred = abs(int(np.argmax(abs(values))) - n_samples // 2) <= n_samples // 4
+    moved = "" if centred else ", moved from index 0 (where its peak is) to the centre"
+    values = values if centred else np.fft.fftshift(values)
+    return values / scale, f"Impulse response from {Path(origin).name}, divided by {scale:.4g}{moved}."
+
+
+def _content(header: Node, msot: Path, expected: int) -> tuple[bytes | None, str]:
+    file = inside(msot.parent, f"{msot.stem}.irf")
+    if file.exists():
+        return read_at_most(file, max(expected, 2**20)), str(file)
+    # Presets hold an element of the same name that is just "true" or "false".
+    texts = (e.text or "" for e in header.element.iter() if local_name(e) == "ImpulseResponse")
+    embedded = [text.strip() for text in texts if len(text.strip()) > len("false")]
+    if not embedded:
+        return None, ""
+    origin = f"{header.where} <ImpulseResponse>"
+    try:
+        return base64.b64decode("".join(embedded[0].split()), validate=True), origin
+    except (binascii.Error, ValueError):
+        raise ReadError(f"{origin}: expected base64, found {embedded[0][:20]!r} ...") from None
+
+
+def _largest_magnitude(values: np.ndarray, origin: str) -> float:
+    """Return the largest magnitude of the spectrum. Raises `ReadError` where it is no positive number."""
+    if not np.isfinite(values).all():
+        raise ReadError(f"{origin}: expected finite numbers, found {(~np.isfinite(values)).sum()} that are not")
+    largest = float(abs(np.fft.rfft(values)).max())
+    if not 0 < largest < float("inf"):
+        raise ReadError(f"{origin}: expected an impulse response, found only zeros or numbers out of range")
+    return largest

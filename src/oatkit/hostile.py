@@ -1,0 +1,173 @@
+"""Guards for files that may be damaged or hostile: XML, HDF5, and names and texts taken from a file.
+
+Each refuses before it reads: sizes are compared with the limits below, HDF5 links and external storage are looked at
+without being followed, and XML entities and document types are never expanded. What they raise is `ReadError`.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import prod
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder
+
+from oatkit.errors import OatkitError, ReadError
+
+MAX_XML_BYTES = 64 * 2**20
+MAX_XML_DEPTH = 64
+MAX_XML_ELEMENTS = 1_000_000
+MAX_CHUNK_BYTES = 64 * 2**20
+MAX_ATTRIBUTES = 100
+HDF5_FILTERS = frozenset({1, 2, 3})
+"""Deflate, shuffle and fletcher32: those that every HDF5 library has built in."""
+MAX_DEFLATE_RATIO = 1100
+"""Deflate cannot shrink data by more than a factor of 1032."""
+
+
+def regular_file(path: Path) -> Path:
+    """Return `path`, or raise `ReadError` where it is no readable regular file (a device would block for ever)."""
+    try:
+        if not path.exists():
+            raise ReadError(f"{path}: there is no such file")
+        if not path.is_file():
+            raise ReadError(f"{path}: expected a file, found a folder or a device")
+    except (OSError, ValueError) as error:
+        raise ReadError(f"{path}: cannot be opened ({error})") from None
+    return path
+
+
+def read_at_most(path: Path, limit: int) -> bytes:
+    """Return the content of a regular file of at most `limit` bytes."""
+    size = regular_file(path).stat().st_size
+    if size > limit:
+        raise ReadError(f"{path}: {size} bytes; at most {limit} are read of such a file")
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def inside(folder: Path, name: str) -> Path:
+    """Return the path of `name` in `folder`; refuse one that leads out of it, by itself or through a symbolic link."""
+    try:
+        path = folder / name
+        if path.resolve().is_relative_to(folder.resolve()) and path.resolve() != folder.resolve():
+            return path
+    except (OSError, ValueError, RuntimeError) as error:
+        raise ReadError(f"{folder}: {name!r} is no file name ({error})") from None
+    raise ReadError(f"{folder}: {name!r} leads out of the folder; only files inside it are read")
+
+
+def printable(text: str, limit: int = 500) -> str:
+    """Return `text` without control characters (a terminal would obey them) and cut to `limit` characters."""
+    return "".join(c if c.isprintable() else "?" for c in text.strip())[:limit]
+
+
+class _LimitedBuilder(TreeBuilder):
+    """Builds the tree and counts; `Element` trees that are too deep crash whoever walks or frees them."""
+
+    def __init__(self, where: Path) -> None:
+        super().__init__()
+        self._where, self._depth, self._count = where, 0, 0
+
+    def start(self, tag: str, attrs: Any, /) -> Element:
+        self._depth += 1
+        self._count += 1
+        if self._depth > MAX_XML_DEPTH:
+            raise ReadError(f"{self._where}: XML nested deeper than {MAX_XML_DEPTH} elements at <{tag[:60]}>")
+        if self._count > MAX_XML_ELEMENTS:
+            raise ReadError(f"{self._where}: more than {MAX_XML_ELEMENTS} XML elements")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> Element:
+        self._depth -= 1
+        return super().end(tag)
+
+
+def parse_xml(content: bytes, where: Path) -> Element:
+    """Return the root element of an XML text in any encoding that it declares; `where` is named in errors."""
+    from defusedxml.common import DefusedXmlException
+    from defusedxml.ElementTree import DefusedXMLParser
+
+    if len(content) > MAX_XML_BYTES:
+        raise ReadError(f"{where}: {len(content)} bytes of XML; at most {MAX_XML_BYTES} are read")
+    parser = DefusedXMLParser(target=_LimitedBuilder(where), forbid_dtd=True)
+    try:
+        parser.feed(content)
+        return parser.close()
+    except DefusedXmlException as error:
+        raise ReadError(f"{where}: XML with a document type or entities is refused ({type(error).__name__})") from None
+    except (ParseError, LookupError, ValueError) as error:
+        raise ReadError(f"{where}: expected complete XML, found an error: {error}") from None
+
+
+@contextmanager
+def open_hdf5(path: Path) -> Iterator[Any]:
+    """Open an HDF5 file for reading; whatever the library finds broken, then or later, becomes a `ReadError`."""
+    import h5py
+
+    regular_file(path)
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except OatkitError:
+        raise
+    except (OSError, RuntimeError, LookupError, ValueError, TypeError, MemoryError, ArithmeticError) as error:
+        raise ReadError(f"{path}: not a complete HDF5 file, or damaged ({printable(str(error), 200)})") from None
+
+
+def hdf5_dataset(file: Any, name: str, kinds: str, ndim: int, limit: int | None = None) -> Any:
+    """Return the dataset `name` of an open file, checked before anything of it is read.
+
+    `kinds` are numpy's letters for the types that it may have, `limit` the largest number of bytes that it may
+    declare. Refused are links other than hard ones, external and virtual storage, more bytes declared than can be in
+    the file, oversized chunks, unusual filters and masses of attributes.
+    """
+    import h5py
+
+    where = f"{printable(str(file.filename))} '{name}'"
+    item = file
+    for part in name.split("/"):
+        link = item.get(part, getlink=True) if isinstance(item, h5py.Group) else None
+        if link is None:
+            raise ReadError(f"{where}: expected a dataset, found nothing")
+        if not isinstance(link, h5py.HardLink):
+            raise ReadError(f"{where}: links are refused, found a {type(link).__name__}")
+        item = item[part]
+    if not isinstance(item, h5py.Dataset):
+        raise ReadError(f"{where}: expected a dataset, found a {type(item).__name__}")
+    problem = _wrong_type(item, kinds, ndim) or _wrong_storage(item, limit)
+    if problem:
+        raise ReadError(f"{where}: {problem}")
+    return item
+
+
+def _wrong_type(item: Any, kinds: str, ndim: int) -> str:
+    """Say what is wrong with the type of a dataset, or nothing."""
+    if item.dtype.kind not in kinds or item.dtype.hasobject:
+        return f"expected a type of kind '{kinds}', found {item.dtype}"
+    if item.ndim != ndim:
+        return f"expected {ndim} axes, found the shape {item.shape}"
+    if len(item.attrs) > MAX_ATTRIBUTES:
+        return f"{len(item.attrs)} attributes; at most {MAX_ATTRIBUTES} are taken"
+    return ""
+
+
+def _wrong_storage(item: Any, limit: int | None) -> str:
+    """Say what is wrong with the way in which a dataset is stored, or nothing."""
+    if item.is_virtual or item.external:
+        return "the data lie in other files, which are not read"
+    creation = item.id.get_create_plist()
+    filters = {creation.get_filter(i)[0] for i in range(creation.get_nfilters())}
+    if not filters <= HDF5_FILTERS:
+        return f"the HDF5 filters {sorted(filters - HDF5_FILTERS)} are not among those that are read"
+    chunk_bytes = prod(item.chunks or (0,)) * item.dtype.itemsize
+    if chunk_bytes > MAX_CHUNK_BYTES:
+        return f"a chunk of {chunk_bytes} bytes; at most {MAX_CHUNK_BYTES} are read"
+    declared = prod(item.shape) * item.dtype.itemsize
+    if limit is not None and declared > limit:
+        return f"the shape {item.shape} declares {declared} bytes; at most {limit} are read"
+    stored = min(item.id.get_storage_size(), Path(item.file.filename).stat().st_size)
+    if declared > stored * (MAX_DEFLATE_RATIO if 1 in filters else 1):
+        return f"the shape {item.shape} declares {declared} bytes, the file holds {stored}"
+    return ""

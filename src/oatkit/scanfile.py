@@ -1,0 +1,174 @@
+"""The scan file of oatkit: one HDF5 file that holds a `Scan` and, where it was simulated, the image it came from.
+
+The first 512 bytes are the user block, which begins with `MARKER` and the version. Then comes HDF5 in the format of
+its version 1.10, the oldest that protects its own tables by checksums, with these datasets, all chunked with a
+fletcher32 checksum, uncompressed, little-endian::
+
+    /about             JSON in UTF-8, one fixed-length string: name, source, reader, speed_of_sound_source, notes,
+                       sampling_rate_hz, start_time_s, speed_of_sound_m_s, wavelengths_nm, and, with a truth, its
+                       quantity, unit, pixel_size_m, centre_m and wavelengths_nm
+    /signals           (frame, wavelength, detector, sample), any real type; one chunk holds one pulse
+    /detectors_m       (detector, 2), each (y, x)
+    /valid             (frame, wavelength, detector), 0 or 1
+    /impulse_response  (n,), time zero at n // 2                            optional
+    /pulse_energy      (frame, wavelength)                                  optional, and so the next three
+    /temperature_c     /timestamps_s     /position_m
+    /truth             (wavelength, y, x), row 0 at the bottom              optional
+"""
+
+import json
+import os
+import secrets
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from oatkit.atomic import check_output, check_space, sync
+from oatkit.data import Grid, Image, Scan
+from oatkit.errors import ReadError, ResultError, ValidationError
+from oatkit.hostile import MAX_CHUNK_BYTES, hdf5_dataset, open_hdf5
+
+MARKER = b"oatkit scan "
+VERSION = 1
+USER_BLOCK = 512
+PER_PULSE = ("pulse_energy", "temperature_c", "timestamps_s", "position_m")
+"""Fields of a scan with one number for each frame and wavelength, and the datasets of the same names."""
+MAX_ABOUT_BYTES = 4 * 2**20
+MAX_ARRAY_BYTES = 512 * 2**20
+"""Limit for every dataset but the signals, which are read in parts."""
+
+
+def write_scan(scan: Scan, path: Path | str, truth: Image | None = None, overwrite: bool = False) -> None:
+    """Write a scan, frame by frame, with the image that it was simulated from.
+
+    The file stands under its name only when it is complete. Raises `ResultError` where it cannot be written, or exists
+    and `overwrite` is not asked for.
+    """
+    path = Path(path).absolute()
+    check_output(path, [scan.source], overwrite)
+    check_space(path, _size(scan, truth))  # HDF5 crashes the interpreter on a full disk
+    hidden = path.with_name(f".{path.name}.partial-{os.getpid()}-{secrets.token_hex(3)}")
+    try:
+        _write(hidden, scan, truth)
+        sync(hidden)
+        os.replace(hidden, path)
+        sync(path.parent)
+    except OSError as error:
+        raise ResultError(f"{path}: the scan could not be written: {error.strerror or error}") from error
+    finally:
+        hidden.unlink(missing_ok=True)
+
+
+def read_truth(path: Path | str) -> Image | None:
+    """Return the image that a scan was simulated from, or None where the file has none. Raises `ReadError`."""
+    path = Path(path)
+    with open_hdf5(path) as file:
+        about = read_about(file, path)
+        if "truth" not in about:
+            return None
+        values = hdf5_dataset(file, "truth", "f", 3, MAX_ARRAY_BYTES)[()]
+    try:
+        known = about["truth"]
+        grid = Grid(values.shape[1:], known["pixel_size_m"], tuple(known["centre_m"]))
+        return Image(values, known["quantity"], known["unit"], grid, tuple(known["wavelengths_nm"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ReadError(f"{path} 'about': the description of the truth is unusable ({error!r})") from None
+
+
+def read_about(file: Any, path: Path) -> dict[str, Any]:
+    """Return the JSON of ``/about``, after a look at marker and version. Raises `ReadError`."""
+    check_marker(path)
+    stored = hdf5_dataset(file, "about", "S", 1, MAX_ABOUT_BYTES)
+    if stored.shape != (1,):
+        raise ReadError(f"{path} 'about': expected one text, found the shape {stored.shape}")
+    try:
+        about = json.loads(stored[0].decode(), parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise ReadError(f"{path} 'about': expected JSON in UTF-8, found an error: {error}") from None
+    if not isinstance(about, dict):
+        raise ReadError(f"{path} 'about': expected a JSON object, found a {type(about).__name__}")
+    return about
+
+
+def is_scan_file(path: Path) -> bool:
+    """Say whether a file begins as a scan file does; never raises."""
+    try:
+        if not path.is_file():  # opening a pipe would block
+            return False
+        with open(path, "rb") as file:
+            return file.read(len(MARKER)) == MARKER
+    except (OSError, ValueError):
+        return False
+
+
+def check_marker(path: Path) -> None:
+    """Raise `ReadError` unless the file begins with the marker and a version that this oatkit knows."""
+    with open(path, "rb") as file:
+        head = file.read(64)
+    version = head[len(MARKER) :].split(b"\n")[0]
+    if not head.startswith(MARKER):
+        raise ReadError(f"{path}: expected a scan file that begins with {MARKER!r}, found {head[:16]!r}")
+    if version != b"%d" % VERSION:
+        raise ReadError(
+            f"{path}: expected version {VERSION} of the scan file, found {version.decode('ascii', 'replace')!r}"
+        )
+
+
+def _refuse_constant(word: str) -> float:
+    raise ValueError(f"{word} is no number")
+
+
+def _size(scan: Scan, truth: Image | None) -> int:
+    """Return an upper bound for the size of the file, bytes."""
+    pulses = scan.frames * len(scan.wavelengths_nm)
+    arrays = prod(scan.signals.shape) * scan.signals.dtype.itemsize + scan.valid.nbytes
+    return arrays + (truth.values.nbytes if truth else 0) + 1024 * pulses + 4 * 2**20
+
+
+def _write(path: Path, scan: Scan, truth: Image | None) -> None:
+    import h5py
+
+    with h5py.File(path, "x", libver=("v110", "v110"), userblock_size=USER_BLOCK) as file:
+        _write_signals(file, scan)
+        for name, values in _arrays(scan, truth).items():
+            file.create_dataset(name, data=values, chunks=_chunk(values.shape, values.dtype), fletcher32=True)
+    with open(path, "r+b") as head:
+        head.write(MARKER + b"%d\n" % VERSION)
+
+
+def _write_signals(file: Any, scan: Scan) -> None:
+    shape, dtype = scan.signals.shape, scan.signals.dtype.newbyteorder("<")
+    chunks = (1, 1, *_chunk(shape[2:], dtype))
+    signals = file.create_dataset("signals", shape, dtype, chunks=chunks, fletcher32=True)
+    for frame in range(scan.frames):
+        signals[frame] = scan.signals[frame]
+
+
+def _arrays(scan: Scan, truth: Image | None) -> dict[str, np.ndarray]:
+    """Return what is stored beside the signals, by the name of its dataset."""
+    arrays = {name: getattr(scan, name) for name in PER_PULSE}
+    arrays |= {"detectors_m": scan.geometry.detectors.positions_m, "impulse_response": scan.geometry.impulse_response}
+    arrays |= {"valid": scan.valid.astype("u1"), "about": np.array([json.dumps(_about(scan, truth)).encode()])}
+    arrays |= {"truth": truth.values if truth else None}
+    return {name: values for name, values in arrays.items() if values is not None}
+
+
+def _about(scan: Scan, truth: Image | None) -> dict[str, Any]:
+    texts = ("name", "source", "reader", "speed_of_sound_source", "notes", "wavelengths_nm")
+    numbers = ("sampling_rate_hz", "start_time_s", "speed_of_sound_m_s")
+    about = {k: getattr(scan, k) for k in texts} | {k: getattr(scan.geometry, k) for k in numbers}
+    if truth:
+        about["truth"] = {k: getattr(truth, k) for k in ("quantity", "unit", "wavelengths_nm")} | {
+            k: getattr(truth.grid, k) for k in ("pixel_size_m", "centre_m")
+        }
+    return about
+
+
+def _chunk(shape: tuple[int, ...], dtype: np.dtype) -> tuple[int, ...]:
+    """Return the chunk of an array: all of it, or as many of its first rows as the reader's limit allows."""
+    row = prod(shape[1:]) * dtype.itemsize
+    if row > MAX_CHUNK_BYTES:
+        raise ValidationError(f"a scan file holds rows of up to {MAX_CHUNK_BYTES} bytes, got {row}")
+    return (min(shape[0], MAX_CHUNK_BYTES // row), *shape[1:])
