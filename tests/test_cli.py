@@ -8,9 +8,9 @@ import sys
 import time
 
 import pytest
-from packages import run_oatkit
 
 import oatkit
+from packages import run_oatkit
 
 SMALL = ("--set", "grid.pixels=32", "--set", "grid.field_of_view_mm=9")
 COMMANDS = ("demo", "info", "run", "pipeline", "plugins", "describe", "simulate", "export", "verify")
@@ -138,7 +138,14 @@ def test_bad_input_gets_a_sentence_and_an_exit_code(what, small_scan_file, store
 def test_ctrl_c_ends_a_run_and_leaves_nothing(small_scan_file, tmp_path):
     """An interrupt ends a long run within seconds with exit code 130 and no file under any name."""
     code = "from oatkit.cli import main; main()"
-    long = ["--set", "grid.pixels=512", "--set", "reconstruct.n_iterations=100000", "--set", "reconstruct.tolerance=1e-15"]
+    long = [
+        "--set",
+        "grid.pixels=512",
+        "--set",
+        "reconstruct.n_iterations=100000",
+        "--set",
+        "reconstruct.tolerance=1e-15",
+    ]
     command = [sys.executable, "-c", code, "run", "nnls", str(small_scan_file), "-o", "out.zarr", *SMALL[2:], *long]
     process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
     time.sleep(12)

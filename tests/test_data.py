@@ -11,7 +11,7 @@ from oatkit import Detectors, Geometry, Grid, Image, Scan, ValidationError
 
 
 def ring(n: int = 8, radius_m: float = 0.04) -> Detectors:
-    """n detectors evenly on a circle about the origin."""
+    """N detectors evenly on a circle about the origin."""
     angle = 2 * np.pi * np.arange(n) / n
     return Detectors(np.column_stack([radius_m * np.sin(angle), radius_m * np.cos(angle)]))
 

@@ -85,13 +85,16 @@ def test_all_errors_of_a_file_are_reported_at_once():
         ("forward = 3\n[reconstruct]\nuse = 'lsqr'", "p.toml forward: must be a forward model, got 3"),
         ("[forward]\nuse = 'arc'\n[reconstruct]\nweight = 1.0", "needs use = "),
         ("[forward]\nuse = 'arc'\n[reconstruct]\nuse = 7", "needs use = "),
-        ("[forward]\nuse = 'arc'\n[reconstruct]\nuse = 'lsqr'\nregularizer = {use = 'entropy'}", "quadratic regularizer"),
+        (
+            "[forward]\nuse = 'arc'\n[reconstruct]\nuse = 'lsqr'\nregularizer = {use = 'entropy'}",
+            "quadratic regularizer",
+        ),
         ("[forward]\nuse = 'arc'\n[reconstruct]\nuse = 'lsqr'\nregularizer = {use = 'laplacien'}", "'laplacian'"),
         ("[scan]\nspeed_of_sound_m_s = 1.5\n[forward]\nuse='arc'\n[reconstruct]\nuse='lsqr'", "at least 300 m/s"),
     ],
 )
 def test_a_broken_file_gets_a_sentence(text, sentence):
-    """Text that is no TOML, a duplicate key, a missing table, a part of the wrong ability: each is said in a sentence."""
+    """Text that is no TOML, a duplicate key, a missing table, a wrong part: each is said in a sentence."""
     with pytest.raises(ValidationError) as caught:
         Pipeline.loads(text, "p.toml")
     assert sentence in str(caught.value)

@@ -3,11 +3,11 @@
 import json
 
 import pytest
-from packages import install, run_oatkit
 
 from oatkit import ValidationError, plugin
 from oatkit.api import KINDS
 from oatkit.registry import installed
+from packages import install, run_oatkit
 
 GOOD = '''
 from oatkit.api import Iterate, Solver, hookimpl, param
@@ -49,7 +49,7 @@ BROKEN = {
 
 @pytest.fixture(scope="module")
 def packages(tmp_path_factory):
-    """A folder with one good plugin package, two that share a name, one that takes a built-in's, and ten broken ones."""
+    """A folder with a good package, two that share a name, one that takes a built-in's, and ten broken ones."""
     target = tmp_path_factory.mktemp("site") / "packages"
     install(target, "oatkit-good", GOOD.format(name="landweber"), "2.5")
     install(target, "oatkit-first", GOOD.format(name="twin"))
@@ -114,7 +114,9 @@ def test_a_built_in_cannot_be_shadowed(packages, listed):
 
 def test_an_unknown_plugin_is_reported_with_the_nearest_name_and_the_broken_ones(packages):
     """A misspelt name gets the nearest known one, and is told of plugins that could not be loaded."""
-    done = run_oatkit("run", "lsqr", "nowhere.msot", "-o", "x.zarr", "--set", "reconstruct.use=landwebber", path=packages)
+    done = run_oatkit(
+        "run", "lsqr", "nowhere.msot", "-o", "x.zarr", "--set", "reconstruct.use=landwebber", path=packages
+    )
     assert done.returncode == 2
     assert "did you mean 'landweber'?" in done.stderr
     assert "no_such_module_anywhere" in done.stderr

@@ -22,9 +22,9 @@ from oatkit.problem import Iterate, Problem, Reference, UnmixProblem
 
 __all__ = [
     "KINDS", "Detectors", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image", "Iterate", "OatkitError",
-    "Optics", "Plugin", "PluginError", "Preprocessor", "Problem", "Proximable", "Quadratic", "ReadError", "Reader", "Reference",
-    "Regularizer", "Scan", "Segmenter", "Signals", "Smooth", "Solver", "SolverError", "UnmixProblem", "Unmixer",
-    "ValidationError", "Weight", "hookimpl", "param",
+    "Optics", "Plugin", "PluginError", "Preprocessor", "Problem", "Proximable", "Quadratic", "ReadError",
+    "Reader", "Reference", "Regularizer", "Scan", "Segmenter", "Signals", "Smooth", "Solver", "SolverError",
+    "UnmixProblem", "Unmixer", "ValidationError", "Weight", "hookimpl", "param",
 ]  # fmt: skip
 
 hookimpl = pluggy.HookimplMarker("oatkit")

@@ -10,9 +10,9 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from enum import Enum
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
 
@@ -33,9 +33,11 @@ EXIT_CODES: dict[type[OatkitError], int] = {
 }  # fmt: skip
 INTERRUPTED = 130
 
-Command = TypeVar("Command", bound=Callable[..., Any])
+Command = Callable[..., Any]
 
-ScanPath = Annotated[Path, typer.Argument(metavar="SCAN", help="The scan: an iThera .msot file, or an oatkit .h5 scan.")]
+ScanPath = Annotated[
+    Path, typer.Argument(metavar="SCAN", help="The scan: an iThera .msot file, or an oatkit .h5 scan.")
+]
 ResultPath = Annotated[Path, typer.Argument(metavar="OUT.zarr", help="A result that `oatkit run` has written.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
@@ -78,7 +80,7 @@ def _complain(text: str) -> None:
         typer.echo(f"oatkit: {line}", err=True)
 
 
-class Phantom(str, Enum):
+class Phantom(StrEnum):
     """The phantoms of `oatkit simulate`."""
 
     BREAST = "breast"
@@ -89,7 +91,9 @@ class Phantom(str, Enum):
 
 @command
 def demo(
-    folder: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Where to write.")] = Path("oatkit-demo"),
+    folder: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Where to write.")] = Path(
+        "oatkit-demo"
+    ),
     overwrite: Overwrite = False,
 ) -> None:
     """Simulate a scan, reconstruct it three ways and compare them with the truth in one figure. Needs no network."""
@@ -113,7 +117,9 @@ def info(scan: ScanPath, as_json: AsJson = False) -> None:
 
 @command
 def run(
-    pipeline: Annotated[str, typer.Argument(metavar="PIPELINE", help="A preset's name (maxent, lsqr, ...) or a .toml.")],
+    pipeline: Annotated[
+        str, typer.Argument(metavar="PIPELINE", help="A preset's name (maxent, lsqr, ...) or a .toml.")
+    ],
     scan: ScanPath,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.zarr", help="The folder to write.")],
     changes: Changes = [],  # noqa: B006 - typer wants a plain list
@@ -146,7 +152,9 @@ def run(
 
 @command
 def pipeline(
-    preset_name: Annotated[str, typer.Argument(metavar="PRESET", help="Its name; without it, the list of presets.")] = "",
+    preset_name: Annotated[
+        str, typer.Argument(metavar="PRESET", help="Its name; without it, the list of presets.")
+    ] = "",
 ) -> None:
     """Print a preset as TOML: save it, change it, run it."""
     from oatkit.pipeline import preset, presets
@@ -173,7 +181,9 @@ def plugins(as_json: AsJson = False) -> None:
 
 
 @command
-def describe(name: Annotated[str, typer.Argument(metavar="NAME", help="A plugin's name, as `oatkit plugins` lists it.")]) -> None:
+def describe(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A plugin's name, as `oatkit plugins` lists it.")],
+) -> None:
     """Print what a plugin does, its reference, and its parameters with type, unit, range and default."""
     from oatkit.api import KINDS
     from oatkit.describe import plugin_text
@@ -193,7 +203,9 @@ def describe(name: Annotated[str, typer.Argument(metavar="NAME", help="A plugin'
 def simulate(
     phantom: Annotated[Phantom, typer.Argument(help="What is imaged.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="SCAN.h5", help="The scan file to write.")],
-    snr: Annotated[float, typer.Option(help="Signal to noise in dB, in the window that the field of view reaches.")] = 32.0,
+    snr: Annotated[
+        float, typer.Option(help="Signal to noise in dB, in the window that the field of view reaches.")
+    ] = 32.0,
     seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
     overwrite: Overwrite = False,
 ) -> None:
@@ -229,7 +241,7 @@ def verify(result: ResultPath) -> None:
 
     found = problems_of(result)
     for problem in found:
-        _complain(f"{result}: {problem}")
+        _complain(problem)
     if found:
         raise typer.Exit(EXIT_CODES[ReadError])
     typer.echo(f"{result}: complete, all checksums right")

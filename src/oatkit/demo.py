@@ -15,10 +15,12 @@ from oatkit.registry import plugin
 METHODS = ("lsqr", "lsqr-threshold", "maxent")
 """The presets that the demo compares."""
 
+WHAT = "a breast-like phantom, 256 detectors on 270 degrees, SNR 32 dB over the samples that the image can reach"
+
 
 def simulated(phantom: str, snr_db: float, seed: int) -> tuple[Scan, Image]:
     """Return a scan of a phantom and the truth on the grid of the presets; the simulating grid is a finer one."""
-    from oatkit.simulate import simulate_scan, truth  # phantoms need scikit-image
+    from oatkit.simulate import simulate_scan, truth
 
     arc = plugin("forward_model", "arc")()
     assert isinstance(arc, ForwardModel)
@@ -39,7 +41,7 @@ def run_demo(folder: Path, overwrite: bool = False) -> Iterator[str]:
     from oatkit.scanfile import write_scan
 
     folder.mkdir(parents=True, exist_ok=True)
-    yield "simulating a breast-like phantom, 256 detectors on 270 degrees, 32 dB of noise ..."
+    yield f"simulating {WHAT} ..."
     scan, truth = simulated("breast", snr_db=32.0, seed=0)
     write_scan(scan, folder / "scan.h5", truth, overwrite=overwrite)
     yield f"wrote {folder / 'scan.h5'}"
@@ -52,7 +54,8 @@ def run_demo(folder: Path, overwrite: bool = False) -> Iterator[str]:
         yield f"{name}: {', '.join(scores(image, truth))}"
     result.save(folder / f"{METHODS[-1]}.zarr", overwrite=overwrite)
     yield f"wrote {folder / METHODS[-1]}.zarr"
-    write_comparison(figure, panels, overwrite=overwrite)
+    title = "One simulated scan, three reconstructions"
+    write_comparison(figure, panels, title, WHAT, overwrite)
     yield f"wrote {figure}"
 
 
@@ -64,8 +67,7 @@ def scores(image: Image, truth: Image) -> list[str]:
         f"PSNR {psnr(x, true):.2f} dB",
         f"SSIM {ssim(x, true):.3f}",
         f"RMSE {rmse(x, true):.4f}",
-        f"{negative.count} negative pixels ({100 * negative.share:.1f} %)",
+        f"{negative.count:,} negative pixels ({100 * negative.share:.1f} %)",
     ]
     gap = image.diagnostics.get("relative_gap", (float("nan"),))[0]
-    return lines + [f"within {gap:.1e} of the optimum"] if gap == gap else lines
-
+    return [*lines, f"within {gap:.1e} of the optimum"] if gap == gap else lines

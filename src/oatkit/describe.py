@@ -75,7 +75,9 @@ def scan_text(scan: Scan) -> str:
         "samples": f"{table['samples']} at {table['sampling_rate_hz'] / 1e6:g} MHz, {table['dtype']}",
         "speed of sound": f"{table['speed_of_sound_m_s']:.1f} m/s ({table['speed_of_sound_source']})",
         "temperature": "unknown" if temperature is None else f"{temperature:.2f} degrees Celsius",
-        "impulse response": f"{table['impulse_response_samples']} samples" if table["impulse_response_samples"] else "none",
+        "impulse response": f"{table['impulse_response_samples']} samples"
+        if table["impulse_response_samples"]
+        else "none",
     }
     lines = [f"{name:<18}{value}" for name, value in rows.items()]
     return "\n".join([*lines, *(f"note: {note}" for note in table["notes"])])

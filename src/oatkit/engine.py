@@ -7,6 +7,7 @@ everywhere. A step is computed again only where the scan, the frame or a step up
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ def run(
     A weight that is still the name of a rule is chosen first, on the scan's first frame. `on_event` is shown every
     event. Raises an `OatkitError`.
     """
-    memo = memo or Memo()
+    memo = Memo() if memo is None else memo
     resolved, choice = resolve(pipeline, scan, memo)
     return run_resolved(resolved, pipeline, choice, scan, frame, memo, on_event)
 
@@ -110,7 +111,7 @@ def steps(pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = No
     Raises `ValidationError` where the weight is still the name of a rule (`resolve` chooses it), `PluginError` where
     a plugin returns what it may not.
     """
-    memo = memo or Memo()
+    memo = Memo() if memo is None else memo
     scan = pipeline.scan.apply(scan)
     grid = pipeline.grid.grid()
     scan.geometry.check_grid(grid)
@@ -164,7 +165,7 @@ def problems(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iterato
     signals = np.asarray(clean.signals)[0]
     for wavelength, record, valid in zip(clean.wavelengths_nm, signals, clean.valid[0], strict=True):
         rows = np.repeat(valid, clean.geometry.n_samples)
-        masked = memo.get((key, rows.tobytes()), lambda rows=rows: without_rows(operator, rows), _operator_bytes)
+        masked = memo.get((key, rows.tobytes()), partial(without_rows, operator, rows), _operator_bytes)
         data = np.where(rows, record.ravel(), 0)
         yield wavelength, Problem(masked, data, grid.shape, clean.geometry, grid)
 
@@ -177,7 +178,7 @@ def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None) -> tuple[P
     """
     if not isinstance(getattr(pipeline.reconstruct, "weight", None), str):
         return pipeline, None
-    memo = memo or Memo()
+    memo = Memo() if memo is None else memo
     scan = pipeline.scan.apply(scan)
     clean = preprocess(pipeline, scan.frame(0))
     _, strongest = max(

@@ -124,7 +124,7 @@ def _entry(kind: str, cls: Any, whole: Entry) -> Entry:
     if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", name):
         return replace(entry, problem=f"'{name}' is no plugin name: small letters, digits and single hyphens")
     if inspect.isabstract(cls):
-        missing = ", ".join(sorted(cls.__abstractmethods__))  # type: ignore[attr-defined]
+        missing = ", ".join(sorted(cls.__abstractmethods__))
         return replace(entry, problem=f"{cls.__name__} lacks the method {missing}")
     return replace(entry, status="ok", cls=cls)
 

@@ -28,7 +28,9 @@ def image_lines(name: str, image: Image) -> Iterator[str]:
         parts = [f"{negative} of {plane.size} pixels negative ({100 * negative / plane.size:.1f} %)"]
         if "products" in found:
             parts.append(f"{found['products'][index]} products")
-            parts.append(f"residual {found['residual_norm'][index] / max(found['data_norm'][index], 1e-300):.3f} of the data")
+            parts.append(
+                f"residual {found['residual_norm'][index] / max(found['data_norm'][index], 1e-300):.3f} of the data"
+            )
             gap = found["relative_gap"][index]
             if isinstance(gap, float) and gap == gap:
                 parts.append(f"within {gap:.1e} of the optimum")
