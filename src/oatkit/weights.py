@@ -19,7 +19,7 @@ Rule = Literal["l-curve", "hold-out"]
 CANDIDATES = tuple(float(weight) for weight in np.geomspace(1e-4, 1.0, 13))
 """Dimensionless weights that are tried unless others are given: three in each decade of 1e-4 .. 1.
 
-On simulated breast, star and vessel phantoms at 32 dB the best weight of every built-in solver lay well inside."""
+The best weight of every built-in solver lay inside for simulated breast, star and vessel phantoms at 32 dB."""
 
 HELD_OUT = 7
 """Every seventh detector is kept back by the rule "hold-out"."""

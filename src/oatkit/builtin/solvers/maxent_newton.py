@@ -129,7 +129,7 @@ def _size(point: Point) -> float:
 def _mean_curvature(objective: Objective) -> float:
     """Estimate the mean of the diagonal of A^T A by one seeded probe of random signs [Hutchinson1990]_."""
     probe = np.random.default_rng(0).choice([-1.0, 1.0], objective.problem.shape)
-    return float((objective.problem.forward(probe) ** 2).mean() * objective.problem.data.size / probe.size)
+    return float((objective.problem.forward(probe) ** 2).sum()) / probe.size
 
 
 def _reweighted(point: Point, weight: float) -> Point:

@@ -61,7 +61,9 @@ class MaxEntNlcg(Solver):
             yield _nothing_to_see(problem)
             return
         if not np.log(weight) + np.log(prior.max()) + np.log(prior.size) < 690:
-            raise ValidationError(f"maxent-nlcg: weight {weight:g} times prior {prior.max():g} leaves the range of floats")
+            raise ValidationError(
+                f"maxent-nlcg: weight {weight:g} times prior {prior.max():g} leaves the range of floats"
+            )
         objective = Objective(problem, weight, prior)
         about = {"prior_mean": float(prior.mean()), **_scale(objective)}
         goal = self.tolerance if self.tolerance > FINE else max(self.tolerance**1.5, ROUNDING)

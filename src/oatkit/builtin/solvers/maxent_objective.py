@@ -31,8 +31,8 @@ class Objective:
         point = Point(self, log_ratio, image, misfit, self.problem.adjoint(misfit))
         if not np.isfinite(point.value):
             raise SolverError(
-                f"maximum entropy: the objective left the range of floats at weight {self.weight:g} and a prior of mean "
-                f"{self.prior.mean():g}; bring data and operator to order 1"
+                f"maximum entropy: the objective left the range of floats at weight {self.weight:g} and a mean prior "
+                f"of {self.prior.mean():g}; bring data and operator to order 1"
             )
         return point
 

@@ -1,0 +1,280 @@
+"""What every installed solver keeps to, and the least-squares solvers against direct and independent solutions."""
+
+import copy
+import pickle
+from itertools import islice
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.sparse.linalg
+
+from oatkit.api import Detectors, Geometry, Grid, Problem
+from oatkit.builtin.forward.arc import Arc
+from oatkit.builtin.regularizers.identity import Identity
+from oatkit.builtin.regularizers.laplacian import Laplacian
+from oatkit.builtin.solvers.backprojection import Backprojection
+from oatkit.builtin.solvers.lsqr import Lsqr
+from oatkit.builtin.solvers.lsqr_threshold import LsqrThreshold
+from oatkit.builtin.solvers.nnls import Nnls
+from oatkit.errors import SolverError, ValidationError
+from oatkit.registry import installed
+from small_problems import PROBLEMS, blurred, circles, dense, noise_like, scaled, too_few_data
+
+INSTALLED = installed().of_kind("solver")
+QUADRATIC = [Lsqr, LsqrThreshold, Nnls]
+
+
+def placed(problem):
+    """The problem with detectors and a grid, for solvers that ask where things are."""
+    angle = np.linspace(0, 5, 4)
+    rows = problem.data.size
+    detectors = Detectors(0.04 * np.column_stack([np.sin(angle), np.cos(angle)])[: 4 if rows % 4 == 0 else 1])
+    # The record passes the grid at the detectors' distance.
+    n_samples = rows // detectors.count
+    geometry = Geometry(detectors, n_samples * 1e6, n_samples, 26e-6)
+    return Problem(problem.operator, problem.data, problem.shape, geometry, Grid(problem.shape, 1e-4))
+
+
+def named(cls):
+    """What pytest calls a solver."""
+    return cls.name
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+def test_every_solver_yields_finite_images_and_an_honest_end(cls, name):
+    """All images are finite, of the problem's shape and left alone afterwards; the last one alone says why it ended."""
+    problem = placed(PROBLEMS[name]())
+    states = list(cls().iterate(problem))
+    kept = [copy.deepcopy(state.image) for state in states]
+    for state, image in zip(states, kept, strict=True):
+        assert state.image.shape == problem.shape
+        assert np.isfinite(state.image).all()
+        np.testing.assert_array_equal(state.image, image)
+    assert not any(state.converged or state.reason for state in states[:-1])
+    assert states[-1].reason
+    misfit = dense(problem) @ states[-1].image.ravel() - problem.data
+    if states[-1].details.get("pixels_set_to_zero", 0) == 0:
+        assert states[-1].residual_norm == pytest.approx(np.linalg.norm(misfit), rel=1e-6)
+
+
+@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+def test_every_solver_is_deterministic(cls):
+    """Two runs give the same image to the last bit, after pickling too."""
+    problem = placed(circles())
+    first = cls().solve(problem).image
+    again = pickle.loads(pickle.dumps(cls())).solve(placed(circles())).image
+    np.testing.assert_array_equal(first, again)
+
+
+@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+def test_every_solver_can_be_cancelled_between_products(cls):
+    """No more than two applications of the operator or its adjoint, each way, lie between two iterates."""
+    problem = placed(circles())
+    calls = []
+
+    class Counting:
+        shape = problem.operator.shape
+
+        def matvec(self, image):
+            calls.append("forward")
+            return problem.forward(image)
+
+        def rmatvec(self, data):
+            calls.append("adjoint")
+            return problem.adjoint(data).ravel()
+
+    steps = cls().iterate(Problem(Counting(), problem.data, problem.shape, problem.geometry, problem.grid))
+    before = 0
+    for _ in islice(steps, 60):
+        assert max(calls[before:].count("forward"), calls[before:].count("adjoint")) <= 2
+        before = len(calls)
+    steps.close()
+
+
+@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+def test_every_solver_gives_zero_for_zero_data(cls):
+    """No signal, no image: zero, converged, and said."""
+    problem = circles()
+    last = cls().solve(placed(Problem(problem.operator, 0 * problem.data, problem.shape)))
+    assert not last.image.any()
+    assert last.converged
+    assert "zero" in last.reason
+
+
+@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+def test_every_solver_follows_the_scale(cls):
+    """With dimensionless weights A -> a A and b -> k b turn the image into k/a times itself."""
+    one = cls().solve(placed(circles())).image
+    other = cls().solve(placed(scaled(circles(), 50.0, 1e-3))).image
+    np.testing.assert_allclose(other * 50.0 / 1e-3, one, atol=1e-5 * abs(one).max())
+
+
+@pytest.mark.parametrize("weight", [1e-12, 1e-6, 1e6, 1e12])
+@pytest.mark.parametrize("cls", [cls for cls in INSTALLED if "weight" in cls.model_fields], ids=named)
+def test_every_solver_survives_absurd_weights(cls, weight):
+    """The image stays finite, and there is a reason."""
+    for problem in (circles(), too_few_data()):
+        last = cls(weight=weight, n_iterations=50).solve(placed(problem))
+        assert np.isfinite(last.image).all()
+        assert last.reason
+
+
+@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+def test_faulty_operator_ends_in_a_sentence(cls):
+    """An operator that returns NaN raises `SolverError`; no image with NaN comes out."""
+    problem = placed(circles())
+    faulty = scipy.sparse.linalg.LinearOperator(
+        problem.operator.shape,
+        matvec=lambda image: np.full(problem.data.size, np.nan),
+        rmatvec=lambda data: np.full(problem.shape, np.nan).ravel(),
+        dtype=float,
+    )
+    with pytest.raises(SolverError, match="not finite"):
+        cls().solve(Problem(faulty, problem.data, problem.shape, problem.geometry, problem.grid))
+
+
+@pytest.mark.parametrize("cls", [cls for cls in INSTALLED if "n_iterations" in cls.model_fields], ids=named)
+def test_too_few_iterations_are_no_convergence(cls):
+    """After a single step the solver says that it stopped, not that it converged, and what to do."""
+    last = cls(n_iterations=1).solve(placed(circles()))
+    assert not last.converged
+    assert "n_iterations" in last.reason
+
+
+def direct(problem, regularizer, tau):
+    """The minimiser of |A x - b|^2 + tau |A|^2 |L x|^2 by a dense least-squares solve, and w."""
+    matrix = dense(problem)
+    w = tau * np.linalg.norm(matrix, 2) ** 2
+    rough = regularizer.operator(problem.shape).matmat(np.eye(matrix.shape[1]))
+    stack = np.vstack([matrix, np.sqrt(w) * rough])
+    padded = np.concatenate([problem.data, np.zeros(len(rough))])
+    return np.linalg.lstsq(stack, padded)[0].reshape(problem.shape), stack, padded
+
+
+@pytest.mark.parametrize("tau", [1e-2, 1e-4])
+@pytest.mark.parametrize("regularizer", [Laplacian(), Identity()], ids=lambda r: r.name)
+@pytest.mark.parametrize("make", [noise_like, too_few_data, blurred, circles])
+def test_lsqr_is_the_direct_solution(make, regularizer, tau):
+    """Run to a gradient of 1e-10, LSQR gives the image of a dense solve of the stack [A; sqrt(w) L]."""
+    problem = make()
+    expected, stack, padded = direct(problem, regularizer, tau)
+    solver = Lsqr(weight=tau, regularizer=regularizer, tolerance=1e-10, n_iterations=5000)
+    last = solver.solve(problem)
+    assert last.converged
+    np.testing.assert_allclose(last.image, expected, atol=1e-5 * abs(expected).max())
+    assert last.objective == pytest.approx(np.sum((stack @ expected.ravel() - padded) ** 2), rel=1e-5)
+    assert last.penalty == pytest.approx(regularizer.value(last.image), rel=1e-12)
+
+
+def test_lsqr_iterates_are_those_of_scipy():
+    """Step by step the images are those of scipy's LSQR on the same stack."""
+    problem = circles()
+    w = 1e-2 * problem.norm**2
+    rough = Laplacian().operator(problem.shape).matmat(np.eye(400))
+    stack, padded = np.vstack([dense(problem), np.sqrt(w) * rough]), np.concatenate([problem.data, np.zeros(400)])
+    states = [s for s in Lsqr(weight=1e-2, n_iterations=12).iterate(problem) if s.iteration]
+    for state in states:
+        expected = scipy.sparse.linalg.lsqr(stack, padded, atol=0, btol=0, iter_lim=state.iteration)[0]
+        np.testing.assert_allclose(state.image.ravel(), expected, atol=1e-12 * abs(expected).max())
+
+
+def test_absolute_weight_is_the_w_of_the_formula():
+    """Scaling = "absolute" with w gives the direct solution for that very w."""
+    problem = noise_like()
+    matrix = dense(problem)
+    expected = np.linalg.solve(matrix.T @ matrix + 3.7 * np.eye(30), matrix.T @ problem.data)
+    solver = Lsqr(weight=3.7, scaling="absolute", regularizer=Identity(), tolerance=1e-13, n_iterations=500)
+    np.testing.assert_allclose(solver.solve(problem).image.ravel(), expected, atol=1e-11)
+
+
+@pytest.mark.parametrize("make", [noise_like, too_few_data, blurred, circles])
+def test_threshold_is_the_positive_part_of_lsqr(make):
+    """lsqr-threshold gives max(lsqr, 0) to the last bit, and counts the pixels that it set to zero."""
+    signed, thresholded = Lsqr().solve(make()), LsqrThreshold().solve(make())
+    np.testing.assert_array_equal(thresholded.image, np.maximum(signed.image, 0))
+    assert thresholded.details["pixels_set_to_zero"] == (signed.image < 0).sum()
+    after = np.linalg.norm(dense(make()) @ thresholded.image.ravel() - make().data)
+    assert thresholded.details["residual_norm_after"] == pytest.approx(after, rel=1e-12)
+
+
+@pytest.mark.parametrize("make", [noise_like, too_few_data, circles])
+def test_nnls_is_the_active_set_solution(make):
+    """On the stack [A; sqrt(w) L], scipy's active-set method finds the same objective to 1e-6 and the same image."""
+    problem = make()
+    solver = Nnls(weight=1e-2, tolerance=1e-8, n_iterations=20_000)
+    last = solver.solve(problem)
+    w = last.objective - last.residual_norm**2
+    assert w == pytest.approx(1e-2 * problem.norm**2 * last.penalty, rel=1e-9)
+    _, stack, padded = direct(problem, Laplacian(), 1e-2 * (problem.norm / np.linalg.norm(dense(problem), 2)) ** 2)
+    expected, residual = scipy.optimize.nnls(stack, padded, maxiter=10_000)
+    assert last.converged
+    assert last.objective == pytest.approx(residual**2, rel=1e-6)
+    np.testing.assert_allclose(last.image.ravel(), expected, atol=1e-4 * expected.max())
+    assert last.image.min() >= 0
+
+
+def test_nnls_meets_the_conditions_of_an_optimum():
+    """At the end the gradient is not negative where the image is zero, and zero where it is not."""
+    problem = blurred()
+    last = Nnls(weight=1e-3, tolerance=1e-6, n_iterations=20_000).solve(problem)
+    _, stack, padded = direct(problem, Laplacian(), 1e-3 * (problem.norm / np.linalg.norm(dense(problem), 2)) ** 2)
+    gradient = stack.T @ (stack @ last.image.ravel() - padded)
+    start = np.linalg.norm(stack.T @ padded)
+    assert last.converged
+    assert gradient[last.image.ravel() == 0].min() >= -1e-5 * start
+    assert abs(gradient[last.image.ravel() > 0]).max() <= 1e-5 * start
+
+
+def ring(count=128, degrees=360.0):
+    """Detectors on a ring of 40 mm that record what comes from a square of 20 mm."""
+    angles = np.deg2rad(degrees * np.arange(count) / count)
+    detectors = Detectors(0.04 * np.column_stack([np.sin(angles), np.cos(angles)]))
+    return Geometry(detectors, 40e6, 1000, 15e-6)
+
+
+def seen_by(geometry, image, grid):
+    """The problem whose data are the signals of an image."""
+    operator = Arc().operator(geometry, grid)
+    return Problem(operator, operator.matvec(image.ravel()), grid.shape, geometry, grid)
+
+
+def test_backprojection_finds_a_gaussian_in_its_place():
+    """On a full ring a Gaussian of 0.5 mm comes back at its place, to a pixel, and at 0.8 to 1.5 of its height."""
+    grid = Grid((100, 100), 2e-4)
+    y, x = np.meshgrid(grid.y_m, grid.x_m, indexing="ij")
+    for centre in [(0.0, 0.0), (4e-3, -2e-3)]:
+        image = np.exp(-((y - centre[0]) ** 2 + (x - centre[1]) ** 2) / (2 * 5e-4**2))
+        found = Backprojection().solve(seen_by(ring(), image, grid)).image
+        peak = np.unravel_index(found.argmax(), found.shape)
+        assert np.hypot(y[peak] - centre[0], x[peak] - centre[1]) <= 3e-4
+        assert 0.8 <= found.max() <= 1.5
+
+
+def test_backprojection_turns_with_the_object():
+    """On a ring of 64, turning the object by 90 degrees turns the image."""
+    grid = Grid((64, 64), 3e-4)
+    image = np.zeros(grid.shape)
+    image[20:28, 35:50] = 1
+    found = Backprojection().solve(seen_by(ring(64), image, grid)).image
+    turned = Backprojection().solve(seen_by(ring(64), np.rot90(image), grid)).image
+    np.testing.assert_allclose(turned, np.rot90(found), atol=1e-4 * abs(found).max())
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_backprojection_takes_degenerate_arrays(count):
+    """One, two or three detectors, and several at one place, give a finite image."""
+    grid = Grid((20, 20), 1e-3)
+    image = np.zeros(grid.shape)
+    image[8:12, 8:12] = 1
+    few = ring(count)
+    doubled = Geometry(Detectors(np.vstack([few.detectors.positions_m] * 2)), 40e6, 1000, 15e-6)
+    for geometry in (few, doubled):
+        assert np.isfinite(Backprojection().solve(seen_by(geometry, image, grid)).image).all()
+
+
+def test_backprojection_needs_to_know_where():
+    """Without geometry and grid it says what is missing."""
+    with pytest.raises(ValidationError, match="geometry and its grid"):
+        Backprojection().solve(circles())

@@ -1,0 +1,198 @@
+"""The choice of weights: Shaw's problem, hold-out of detectors, and what is said of a choice."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+import oatkit
+from oatkit import weights
+from oatkit.api import Detectors, Geometry, Problem
+from oatkit.errors import ValidationError
+from oatkit.weights import CANDIDATES, choose, gcv, l_curve_chord, l_curve_corner, resolve
+from small_problems import blurred, circles, dense
+
+SHAW_DATA = [
+    8.7547455124379323e-04, 5.4996835885761936e-04, 1.7527999407005367e-06, 1.9552372913117047e-03,
+    1.4411645433785081e-02, 5.2800013336393704e-02, 1.3609152023257112e-01, 2.7203484587635818e-01,
+    4.3752225136193390e-01, 5.7547667319875240e-01, 6.2445052213539942e-01, 5.6252658286441348e-01,
+    4.2322239923561566e-01, 2.6768469219560631e-01, 1.4337901162734543e-01, 6.5614569346074361e-02,
+    2.6013851831752945e-02, 9.2336933089481269e-03, 3.2269066658993694e-03, 1.3999201459261811e-03,
+]  # fmt: skip
+"""The data of Shaw's problem with 20 slits, with errors of 1e-6, as in the tests of the GNU Scientific Library."""
+
+
+@pytest.fixture(scope="module")
+def shaw():
+    """Singular values, coefficients of the data, and a thousand values of Tikhonov's lambda."""
+    step = np.pi / 20
+    angle = -np.pi / 2 + (np.arange(20) + 0.5) * step
+    reach = np.sin(angle)[:, None] + np.sin(angle)
+    matrix = step * ((np.cos(angle)[:, None] + np.cos(angle)) * np.sinc(reach)) ** 2
+    left, singular, _ = np.linalg.svd(matrix)
+    lambdas = np.geomspace(singular[0], max(singular[-1], 16 * np.finfo(float).eps * singular[0]), 1000)
+    return singular, left.T @ SHAW_DATA, lambdas
+
+
+def tikhonov(shaw, lambdas):
+    """Residual norm and squared norm of the solution for each lambda."""
+    singular, coefficients, _ = shaw
+    total = singular**2 + lambdas[:, None] ** 2
+    residuals = np.linalg.norm(lambdas[:, None] ** 2 / total * coefficients, axis=1)
+    return residuals, ((singular / total * coefficients) ** 2).sum(axis=1)
+
+
+def test_corner_of_shaws_l_curve(shaw):
+    """The corner is the lambda that the GNU Scientific Library finds on the same thousand points."""
+    lambdas = shaw[2]
+    corner = l_curve_corner(lambdas**2, *tikhonov(shaw, lambdas))
+    assert lambdas[corner] == pytest.approx(5.793190958069266e-06, rel=1e-12)
+
+
+def test_corner_does_not_depend_on_the_order_of_the_weights(shaw):
+    """Rising and falling weights give the same corner and the same furthest point from the chord."""
+    lambdas = shaw[2]
+    falling, rising = tikhonov(shaw, lambdas), tikhonov(shaw, lambdas[::-1])
+    for rule in (l_curve_corner, l_curve_chord):
+        assert lambdas[::-1][rule(lambdas[::-1], *rising)] == lambdas[rule(lambdas, *falling)]
+
+
+def test_chord_lies_near_the_corner_of_an_l():
+    """On two straight branches of slopes -10 and -1/10 both rules find the point where they meet."""
+    t = np.arange(-5.0, 6.0)
+    log_residual, log_norm = np.where(t < 0, t / 10, t), np.where(t < 0, -t, -t / 10)
+    curve = np.exp(t), np.exp(log_residual), np.exp(2 * log_norm)
+    assert l_curve_corner(*curve) == l_curve_chord(*curve) == 5
+
+
+def test_gcv_of_shaws_problem(shaw):
+    """The minimum of the generalised cross-validation function is the library's."""
+    singular, coefficients, lambdas = shaw
+    best = int(np.argmin(gcv(singular, coefficients, 0.0, 20, lambdas**2)))
+    bracket = np.log(lambdas[[best + 1, best - 1]])
+    found = minimize_scalar(
+        lambda t: float(gcv(singular, coefficients, 0.0, 20, np.exp(2 * t))), bounds=bracket, method="bounded",
+        options={"xatol": 1e-10},
+    )  # fmt: skip
+    assert np.exp(found.x) == pytest.approx(1.24921780949e-05, rel=1e-7)
+
+
+def test_gcv_is_what_a_direct_solve_gives():
+    """|A x - b|^2 over the squared trace of 1 - A (A^T A + w)^-1 A^T, written out for a tall matrix."""
+    rng = np.random.default_rng(0)
+    matrix, data, w = rng.standard_normal((9, 5)), rng.standard_normal(9), 0.3
+    left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
+    coefficients = left.T @ data
+    influence = matrix @ np.linalg.solve(matrix.T @ matrix + w * np.eye(5), matrix.T)
+    expected = np.sum((influence @ data - data) ** 2) / np.trace(np.eye(9) - influence) ** 2
+    assert gcv(singular, coefficients, data @ data - coefficients @ coefficients, 9, w) == pytest.approx(expected)
+
+
+def with_geometry(problem, detectors=16):
+    """The problem with a geometry of so many detectors."""
+    angle = np.linspace(0, 4, detectors)
+    places = Detectors(0.04 * np.column_stack([np.sin(angle), np.cos(angle)]))
+    geometry = Geometry(places, 40e6, problem.data.size // detectors)
+    return Problem(problem.operator, problem.data, problem.shape, geometry)
+
+
+def test_l_curve_weight_of_lsqr_is_the_corner_of_direct_solves():
+    """For least squares the chosen weight is the corner of the curve of dense solutions at the same candidates."""
+    problem = blurred()
+    lsqr = oatkit.plugin("solver", "lsqr")(weight="l-curve", tolerance=1e-6, n_iterations=1000)
+    choice = choose(lsqr, problem, "l-curve")
+    matrix, rough = dense(problem), lsqr.regularizer.operator(problem.shape).matmat(np.eye(72))
+    norm = np.linalg.norm(matrix, 2)
+    curve = []
+    for tau in CANDIDATES:
+        x = np.linalg.solve(matrix.T @ matrix + tau * norm**2 * rough.T @ rough, matrix.T @ problem.data)
+        curve.append((np.linalg.norm(matrix @ x - problem.data), np.sum((rough @ x) ** 2)))
+    residuals, penalties = zip(*curve, strict=True)
+    np.testing.assert_allclose([point.residual_norm for point in choice.curve], residuals, rtol=1e-3)
+    np.testing.assert_allclose([point.penalty for point in choice.curve], penalties, rtol=1e-2)
+    assert choice.weight == CANDIDATES[l_curve_corner(CANDIDATES, residuals, penalties)]
+    assert choice.curve[choice.index].weight == choice.weight
+
+
+def test_hold_out_takes_the_weight_that_predicts_best():
+    """The chosen weight has the least misfit over every seventh detector, of images made without those detectors."""
+    problem = with_geometry(circles())
+    choice = choose(oatkit.plugin("solver", "lsqr")(), problem, "hold-out")
+    held_out = np.repeat(np.arange(16) % 7 == 3, 60)
+    errors = []
+    for point in choice.curve:
+        fit = Problem(dense(problem)[~held_out], problem.data[~held_out], problem.shape)
+        image = oatkit.plugin("solver", "lsqr")(weight=point.weight).solve(fit).image
+        errors.append(np.linalg.norm((dense(problem) @ image.ravel() - problem.data)[held_out]))
+    np.testing.assert_allclose([point.prediction_error for point in choice.curve], errors, rtol=1e-3)
+    assert choice.weight == CANDIDATES[int(np.argmin(errors))]
+
+
+@pytest.mark.parametrize("rule", ["l-curve", "hold-out"])
+@pytest.mark.parametrize("name", ["lsqr", "lsqr-threshold", "maxent-nlcg", "nnls"])
+def test_every_solver_with_a_weight_takes_every_rule(name, rule):
+    """The weight is resolved to one of the candidates, and the resolved solver solves."""
+    solver, choice = resolve(oatkit.plugin("solver", name)(weight=rule), with_geometry(circles()))
+    assert solver.weight == choice.weight
+    assert choice.weight in CANDIDATES
+    assert np.isfinite(solver.solve(circles()).image).all()
+    assert set(dict(choice.picks)) == {"curvature", "chord"} | ({"prediction"} if rule == "hold-out" else set())
+
+
+def test_number_is_left_alone():
+    """A solver whose weight is a number, or that has none, comes back as it is."""
+    for name, fields in {"lsqr": {"weight": 0.3}, "backprojection": {}}.items():
+        solver = oatkit.plugin("solver", name)(**fields)
+        assert resolve(solver, circles()) == (solver, None)
+
+
+def test_unresolved_rule_is_refused_by_solvers():
+    """Solving with the name of a rule says who applies it."""
+    for name in ("lsqr", "lsqr-threshold", "maxent-nlcg", "nnls"):
+        with pytest.raises(ValidationError, match=r"'l-curve' has not been applied.*oatkit\.weights\.resolve"):
+            oatkit.plugin("solver", name)(weight="l-curve").solve(circles())
+
+
+def test_choice_does_not_depend_on_the_scale_of_data_and_operator():
+    """A -> 7 A and b -> 0.01 b leave the dimensionless weight as it is."""
+    solver = oatkit.plugin("solver", "maxent-nlcg")(weight="l-curve")
+    small = Problem(7 * dense(circles()), 0.01 * circles().data, circles().shape)
+    assert resolve(solver, small)[1].weight == resolve(solver, circles())[1].weight
+
+
+def test_doubts_are_noted():
+    """A choice at the end of the range, and rules that differ by more than a decade, each get a sentence."""
+    curve = tuple(weights.CurvePoint(w, r, p) for w, r, p in [(1e-3, 1, 3), (1e-2, 2, 2), (1.0, 3, 1)])
+    noted = list(weights._notes(1e-3, curve, {"curvature": 1e-3, "chord": 1.0}))
+    assert "disagree (curvature 0.001, chord 1)" in noted[0]
+    assert "at the end of the range" in noted[1]
+    assert list(weights._notes(1e-2, curve, {"curvature": 1e-2, "chord": 1e-2})) == []
+
+
+@pytest.mark.parametrize(
+    ("rule", "fields", "candidates", "message"),
+    [
+        ("gcv", {}, None, "no rule named 'gcv'; expected l-curve or hold-out"),
+        ("l-curve", {}, [1, 2, 3, 4, float("nan")], "five or more different weights above 0"),
+        ("l-curve", {}, [1, 2, 3, 4, 4], "five or more different weights above 0"),
+        ("l-curve", {"scaling": "absolute"}, None, "dimensionless weights"),
+        ("hold-out", {}, None, "needs a geometry of 14 or more detectors, got none"),
+    ],
+)
+def test_bad_requests_get_a_sentence(rule, fields, candidates, message):
+    """What cannot be chosen is refused before anything is solved."""
+    with pytest.raises(ValidationError, match=message):
+        choose(oatkit.plugin("solver", "lsqr")(**fields), circles(), rule, candidates)
+
+
+def test_solver_without_a_weight_is_refused():
+    """Back-projection has no weight to choose."""
+    with pytest.raises(ValidationError, match="'backprojection' has no weight to choose"):
+        choose(oatkit.plugin("solver", "backprojection")(), circles(), "l-curve")
+
+
+def test_table_of_a_choice_is_plain():
+    """What a result keeps of a choice holds the curve, the picks and their disagreement as plain values."""
+    table = choose(oatkit.plugin("solver", "lsqr")(), blurred(), "l-curve").table()
+    assert table["rule"] == "l-curve"
+    assert len(table["curve"]) == len(CANDIDATES)
+    assert table["disagreement"] == max(table["picks"].values()) / min(table["picks"].values())
