@@ -14,7 +14,7 @@ SOURCE = Path(oatkit.__file__).parent
 HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg", "h5py", "skimage", "tifffile", "typer")
 
 ORDER = [
-    {"errors", "names"},
+    {"errors", "names", "vectors"},
     {"data", "atomic", "plain", "page"},
     {"parameters"},
     {"problem"},
@@ -30,7 +30,7 @@ ORDER = [
 ]
 """Layers of modules from the ground up: a module imports only from layers below its own, or its own."""
 
-FOR_BUILTINS = {"api", "data", "errors", "problem", "scanfile", "hostile", "threads", "masking", "spectra"}
+FOR_BUILTINS = {"api", "data", "errors", "problem", "scanfile", "hostile", "threads", "masking", "spectra", "vectors"}
 
 
 def imported(path: Path) -> set[str]:

@@ -22,6 +22,7 @@ from oatkit.metrics import negative_pixels
 from oatkit.pipeline import Pipeline
 from oatkit.provenance import versions
 from oatkit.result import Result
+from oatkit.vectors import norm
 
 
 @dataclass(frozen=True)
@@ -181,9 +182,7 @@ def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None) -> tuple[P
     memo = Memo() if memo is None else memo
     scan = pipeline.scan.apply(scan)
     clean = preprocess(pipeline, scan.frame(0))
-    _, strongest = max(
-        problems(pipeline, clean, pipeline.grid.grid(), memo), key=lambda pair: float(np.linalg.norm(pair[1].data))
-    )
+    _, strongest = max(problems(pipeline, clean, pipeline.grid.grid(), memo), key=lambda pair: norm(pair[1].data))
     solver, choice = weights.resolve(pipeline.reconstruct, strongest)
     return pipeline.with_solver(solver), choice
 
@@ -228,7 +227,7 @@ def _reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Ite
         for state in solver.iterate(problem):
             yield StepIterate("reconstruct", wavelength, state)
         last.append(_checked_iterate(solver, state, problem))
-        norms.append(float(np.linalg.norm(problem.data)))
+        norms.append(norm(problem.data))
     values = np.stack([state.image for state in last]).astype(np.float32)
     image = Image(
         values,

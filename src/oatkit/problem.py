@@ -10,6 +10,7 @@ import numpy as np
 
 from oatkit.data import Geometry, Grid, Image, read_only
 from oatkit.errors import SolverError, ValidationError
+from oatkit.vectors import inner, norm
 
 _norms: WeakKeyDictionary[Any, tuple[float, int]] = WeakKeyDictionary()
 """Spectral norm of each operator in use, and the applications of A^T A that it took."""
@@ -189,13 +190,13 @@ def spectral_norm(
     """
     steps = min(steps, *problem.operator.shape)
     v = np.random.default_rng(0).standard_normal(problem.shape).ravel()
-    right = [v / np.linalg.norm(v)]
+    right = [v / norm(v)]
     alphas: list[float] = []
     betas: list[float] = []
     value, u = 0.0, np.zeros(problem.data.shape)
     for _ in range(steps):
         u = problem.forward(right[-1]) - (betas[-1] if betas else 0.0) * u
-        alphas.append(float(np.linalg.norm(u)))
+        alphas.append(norm(u))
         left, values, _ = np.linalg.svd(np.diag(alphas) + np.diag(betas, 1))
         value = float(values[0])
         if alphas[-1] <= 1e-14 * value:
@@ -204,8 +205,8 @@ def spectral_norm(
         v = problem.adjoint(u).ravel()
         yield
         basis = np.array(right)
-        v = v - (basis @ v) @ basis  # rounding would let old directions back in
-        betas.append(float(np.linalg.norm(v)))
+        v = v - np.einsum("i,ij->j", np.einsum("ij,j->i", basis, v), basis)  # rounding would let old directions back in
+        betas.append(norm(v))
         fits = betas[-1] * abs(left[-1, 0]) <= tolerance * value
         if betas[-1] <= 1e-14 * value or (fits and len(alphas) >= AT_LEAST):
             break
@@ -218,19 +219,19 @@ def reference(problem: Problem, steps: int = 20) -> Generator[None, None, Refere
     weight = 1e-2 * problem.norm**2
     image = np.zeros(problem.shape)
     residual = problem.back_projected
-    direction, energy = residual, float(np.vdot(residual, residual))
+    direction, energy = residual, inner(residual, residual)
     products = 0
     while products < steps and energy > 0:
         curved = problem.adjoint(problem.forward(direction)) + weight * laplacian(laplacian(direction))
         products += 1
         yield
-        curvature = float(np.vdot(direction, curved))
+        curvature = inner(direction, curved)
         if curvature <= 0:
             break
         step = energy / curvature
         image = image + step * direction
         residual = residual - step * curved
-        previous, energy = energy, float(np.vdot(residual, residual))
+        previous, energy = energy, inner(residual, residual)
         direction = residual + (energy / previous) * direction
     level = float(np.percentile(image, 99))
     if not level > 0:

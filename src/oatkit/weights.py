@@ -13,6 +13,7 @@ import numpy as np
 from oatkit.api import Problem, Solver
 from oatkit.errors import ValidationError
 from oatkit.masking import without_rows
+from oatkit.vectors import norm
 
 Rule = Literal["l-curve", "hold-out"]
 
@@ -116,7 +117,7 @@ def sweep(
         point = CurvePoint(weight, last.residual_norm, last.penalty, converged=last.converged)
         if held_out is not None:
             misfit = (whole.forward(last.image) - whole.data)[held_out]
-            point = replace(point, prediction_error=float(np.linalg.norm(misfit)))
+            point = replace(point, prediction_error=norm(misfit))
         yield point
 
 

@@ -57,4 +57,3 @@ def reached(geometry: Geometry, grid: Grid) -> Windows:
     first = np.floor(near / step_m - start).astype(np.int64) - SPARE
     last = np.ceil(far / step_m - start).astype(np.int64) + SPARE
     return Windows(first, int((last - first).max()) + 1, geometry.n_samples)
-

@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from oatkit.api import Geometry, Grid, Iterate, Problem, Solver, ValidationError, param
+from oatkit.vectors import inner, norm
 
 
 class Backprojection(Solver):
@@ -82,9 +83,9 @@ def _one_detector(
 
 def _scaled(problem: Problem, image: np.ndarray) -> Iterate:
     predicted = problem.forward(image)
-    energy = float(predicted @ predicted)
-    scale = float(predicted @ problem.data) / energy if energy > 0 else 0.0
-    residual = float(np.linalg.norm(scale * predicted - problem.data))
+    energy = inner(predicted, predicted)
+    scale = inner(predicted, problem.data) / energy if energy > 0 else 0.0
+    residual = norm(scale * predicted - problem.data)
     assert problem.geometry is not None
     return Iterate(
         scale * image,

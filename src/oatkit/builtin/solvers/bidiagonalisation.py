@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from oatkit.api import Iterate, Problem, Quadratic
+from oatkit.vectors import norm
 
 
 def least_squares(
@@ -18,10 +19,10 @@ def least_squares(
     """
     stack = _Stack(problem, regularizer, weight)
     image = np.zeros(problem.shape)
-    beta = float(np.linalg.norm(problem.data))
+    beta = norm(problem.data)
     u = stack.with_zeros(problem.data)
     v = problem.back_projected
-    first = float(np.linalg.norm(v))
+    first = norm(v)
     if first == 0:
         reason = "the data are zero" if beta == 0 else "no image on this grid predicts anything of the data"
         yield Iterate(image, 0, beta**2, beta, 0.0, products=0, converged=True, reason=reason)
@@ -30,10 +31,10 @@ def least_squares(
     w, phi_bar, rho_bar = v, beta, alpha
     for iteration in range(1, n_iterations + 1):
         u = stack.forward(v) - alpha * u
-        beta = float(np.linalg.norm(u))
+        beta = norm(u)
         u = u / beta if beta > 0 else u
         v = stack.adjoint(u) - beta * v
-        alpha = float(np.linalg.norm(v))
+        alpha = norm(v)
         v = v / alpha if alpha > 0 else v
         rho = float(np.hypot(rho_bar, beta))
         c, s = rho_bar / rho, beta / rho

@@ -9,6 +9,7 @@ import numpy as np
 from oatkit.api import Iterate, Problem, Quadratic, Solver, Weight, param
 from oatkit.builtin.regularizers.laplacian import Laplacian
 from oatkit.builtin.solvers.bidiagonalisation import least_squares
+from oatkit.vectors import norm
 
 
 class LsqrThreshold(Solver):
@@ -38,6 +39,6 @@ class LsqrThreshold(Solver):
             image = np.maximum(state.image, 0)
             details = {**state.details, "pixels_set_to_zero": int((state.image < 0).sum())}
             if state.reason:
-                after = float(np.linalg.norm(problem.forward(image) - problem.data))
+                after = norm(problem.forward(image) - problem.data)
                 details["residual_norm_after"] = after
             yield replace(state, image=image, details=details)

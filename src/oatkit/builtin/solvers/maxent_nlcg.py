@@ -10,6 +10,7 @@ from oatkit.api import Iterate, Problem, Reference, Solver, ValidationError, Wei
 from oatkit.builtin.solvers.maxent_newton import newton
 from oatkit.builtin.solvers.maxent_objective import ROUNDING, Objective, Point, certified
 from oatkit.builtin.solvers.maxent_paper import conjugate_gradients
+from oatkit.vectors import norm
 
 BLUR_PX = 1.5
 """Standard deviation of the Gaussian that blurs the structural prior."""
@@ -138,6 +139,6 @@ def _iterate(point: Point, gap: float, iteration: int, about: dict[str, Any]) ->
 
 def _nothing_to_see(problem: Problem) -> Iterate:
     """Return the end of a problem without a scale: the prior is zero, and so is the image."""
-    residual = float(np.linalg.norm(problem.data))
+    residual = norm(problem.data)
     reason = "converged: the data are zero, or no image on this grid predicts anything of them"
     return Iterate(np.zeros(problem.shape), 0, residual**2, residual, 0.0, 0.0, problem.settling_products, True, reason)

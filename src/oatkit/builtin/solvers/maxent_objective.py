@@ -8,6 +8,7 @@ import numpy as np
 
 from oatkit.api import Problem, SolverError
 from oatkit.builtin.regularizers.entropy import log_prox
+from oatkit.vectors import norm
 
 ROUNDING = 1e-14
 """Relative error that is granted to a value of P."""
@@ -67,7 +68,7 @@ class Point:
     @cached_property
     def residual_norm(self) -> float:
         """|A x - b|."""
-        return float(np.linalg.norm(self.misfit))
+        return norm(self.misfit)
 
     @cached_property
     def divergence(self) -> float:

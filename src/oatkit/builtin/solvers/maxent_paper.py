@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from oatkit.builtin.solvers.maxent_objective import Objective, Point
+from oatkit.vectors import inner
 
 
 def conjugate_gradients(objective: Objective, start: np.ndarray) -> Generator[Point, None, Point]:
@@ -25,7 +26,7 @@ def conjugate_gradients(objective: Objective, start: np.ndarray) -> Generator[Po
             return point
         predicted = objective.problem.forward(direction)
         curved = objective.problem.adjoint(predicted)
-        step = _step(point, direction, float(predicted @ predicted), slope)
+        step = _step(point, direction, inner(predicted, predicted), slope)
         new = _moved(point, step, direction, predicted, curved)
         yield new
         if not new.value < point.value:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from oatkit.api import Iterate, Problem, Quadratic
+from oatkit.vectors import inner, norm
 
 SAFETY = 1.02
 """The spectral norm is estimated from below; steps are shortened by this factor."""
@@ -23,7 +24,7 @@ def projected_gradient(
     roughest = Problem(penalty, np.zeros(penalty.shape[0]), problem.shape).norm
     rate = SAFETY * (problem.norm**2 + weight * roughest**2)
     start = _Point(problem, penalty, weight, np.zeros(problem.shape))
-    first = float(np.linalg.norm(start.slope))
+    first = norm(start.slope)
     if first == 0:
         reason = "the data are zero, or no image on this grid predicts anything of them"
         yield replace(start.iterate(regularizer, 0), converged=True, reason=reason)
@@ -36,9 +37,9 @@ def projected_gradient(
         ahead = point.image + beta * (point.image - previous.image)
         slope = point.slope + beta * (point.slope - previous.slope)
         new = _Point(problem, penalty, weight, np.maximum(ahead - slope / rate, 0))
-        uphill = float(np.vdot(ahead - new.image, new.image - point.image)) > 0
+        uphill = inner(ahead - new.image, new.image - point.image) > 0
         previous, point, momentum = point, new, 1.0 if uphill else following
-        left = float(np.linalg.norm(point.image - np.maximum(point.image - point.slope / rate, 0))) * rate / first
+        left = norm(point.image - np.maximum(point.image - point.slope / rate, 0)) * rate / first
         state = point.iterate(regularizer, iteration)
         if left <= tolerance:
             yield replace(state, converged=True, reason=f"the projected gradient fell to {left:.1e} of its start")
@@ -61,7 +62,7 @@ class _Point:
 
     def iterate(self, regularizer: Quadratic, iteration: int) -> Iterate:
         """Return it as the state after so many steps."""
-        residual, penalty = float(np.linalg.norm(self.misfit)), regularizer.value(self.image)
+        residual, penalty = norm(self.misfit), regularizer.value(self.image)
         return Iterate(
             self.image,
             iteration,
