@@ -56,7 +56,7 @@ def write_problem(file: Path, scan_path: Path | None) -> None:
         scan, _ = simulated("breast", snr_db=32.0, seed=0)
     else:
         scan = read(scan_path)
-    clean = preprocess(Pipeline.load("maxent"), scan.frame(0))
+    clean = preprocess(Pipeline.load("maxent"), scan, 0)
     geometry = clean.geometry
     response = geometry.impulse_response
     np.savez(

@@ -5,16 +5,24 @@ set -eu
 cd "$(dirname "$0")/.."
 venv=${OATKIT_VENV:-.venv-test}
 python=${PYTHON:-python3}
+
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
-    echo "oatkit needs Python 3.11 or later; $python is older. Set PYTHON to a newer one." >&2
+    echo "oatkit needs Python 3.11 or later; '$python' is none. Set PYTHON to one." >&2
     exit 1
 }
-"$python" -m venv "$venv" || {
-    echo "python3 could not make a virtual environment. On Debian: apt-get install python3-venv" >&2
-    exit 1
-}
+# Debian keeps the module that makes virtual environments in a package of its own.
+if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
+    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+        apt-get update -qq && apt-get install -y -qq python3-venv
+    else
+        echo "Python cannot make virtual environments here. On Debian: sudo apt-get install python3-venv" >&2
+        exit 1
+    fi
+fi
+"$python" -m venv "$venv"
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -e '.[test]'
 "$venv/bin/ruff" format --check .
 "$venv/bin/ruff" check .
 "$venv/bin/mypy"
-exec "$venv/bin/python" -m pytest "$@"
+# Tests on small dense matrices are several times slower where the BLAS competes with our own threads.
+OPENBLAS_NUM_THREADS=1 exec "$venv/bin/python" -m pytest "$@"

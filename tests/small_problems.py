@@ -47,6 +47,22 @@ def three_pixels():
     return Problem(np.eye(3), np.array([1.0, 0.0, -1.0]), (1, 3))
 
 
+class Counting:
+    """The operator of a problem, counting its applications; it has no dtype, as operators need none."""
+
+    def __init__(self, problem):
+        self.problem, self.shape = problem, problem.operator.shape
+        self.forwards = self.adjoints = 0
+
+    def matvec(self, image):
+        self.forwards += 1
+        return self.problem.forward(image)
+
+    def rmatvec(self, data):
+        self.adjoints += 1
+        return self.problem.adjoint(data).ravel()
+
+
 PROBLEMS = {
     "noise_like": noise_like,
     "too_few_data": too_few_data,

@@ -40,6 +40,8 @@ def test_pixels_are_centred_on_the_grid(ny, nx, h, y):
         (lambda: Grid((10, 10), 0.1), "unit is m"),
         (lambda: Grid((10, 10), float("nan")), "unit is m"),
         (lambda: Grid((0, 10), 1e-4), "(ny, nx)"),
+        (lambda: Grid((float("nan"), 10), 1e-4), "(ny, nx)"),
+        (lambda: Geometry(ring(), 40e6, 100.5), "whole number"),
         (lambda: Detectors([[40.0, 0.0]]), "40 mm is 0.04"),
         (lambda: Detectors([[0.04, 0.0, 0.0]]), "from_xyz"),
         (lambda: Detectors.from_xyz([[0.04, 0.0, 0.0], [0.04, 0.0, 0.01]]), "one plane"),
@@ -106,6 +108,27 @@ def test_content_decides_equality_and_hash():
     assert hash(one) == hash(two)
     assert pickle.loads(pickle.dumps(one)) == one
     assert one != other
+
+
+def test_what_lies_in_a_tuple_counts():
+    """Images whose diagnostics differ in one element of an array within a tuple are not equal."""
+    changed = np.arange(5000.0)
+    changed[2500] = -1
+    grid = Grid((3, 2), 1e-4)
+    one, other = (
+        Image(np.ones((3, 2)), "p", "Pa", grid, diagnostics={"a": (v,)}) for v in (np.arange(5000.0), changed)
+    )
+    assert one != other
+    assert one == pickle.loads(pickle.dumps(one))
+
+
+def test_a_scan_is_its_data_and_not_its_name():
+    """A scan that was moved or renamed keeps its fingerprint; one changed sample gives another."""
+    signals = np.ones((1, 1, 8, 5))
+    scan = scan_of(signals, name="a", source="/here")
+    assert scan_of(signals, name="b", source="/there").fingerprint == scan.fingerprint
+    signals[0, 0, 0, 0] = 2
+    assert scan_of(signals, name="a", source="/here").fingerprint != scan.fingerprint
 
 
 def test_one_frame_keeps_its_own_rows():

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from oatkit import Memo, Pipeline, PluginError, SolverError, ValidationError, load, run, run_frames, steps
-from oatkit.api import Iterate, Problem, Segmenter, Solver, param
+from oatkit import Memo, Pipeline, PluginError, SolverError, ValidationError, load, plugin, run, run_frames, steps
+from oatkit.api import ForwardModel, Iterate, Problem, Segmenter, Solver, param
 from oatkit.data import Image
 from oatkit.engine import StepDone, StepIterate
 
@@ -26,6 +26,10 @@ class Rogue(Solver):
         image = np.zeros(problem.shape)
         if self.what == "nan":
             image[0, 0] = np.nan
+        if self.what == "huge":
+            image[0, 0] = 1e39  # more than a float32 can hold
+        if self.what == "foreign":
+            raise ZeroDivisionError
         if self.what == "shape":
             image = image[1:]
         if self.what == "raises":
@@ -44,6 +48,20 @@ class Circle(Segmenter):
         """Return the distance to the circle."""
         y, x = np.meshgrid(image.grid.y_m, image.grid.x_m, indexing="ij")
         return Image(np.hypot(y, x) - self.radius * 1e-3, "boundary", "m", image.grid)
+
+
+class Heavy(ForwardModel):
+    """The arc model, with operators that say that they hold more than the memo may."""
+
+    name: ClassVar[str] = "heavy"
+    built: ClassVar[list[int]] = []
+
+    def operator(self, geometry, grid):
+        """Return the operator of the arc model, and count."""
+        self.built.append(1)
+        operator = plugin("forward_model", "arc")().operator(geometry, grid)
+        operator.nbytes = 10**12
+        return operator
 
 
 def small(preset: str, *changes: str) -> Pipeline:
@@ -116,7 +134,9 @@ def test_a_run_can_be_left_at_any_iterate(small_scan):
 @pytest.mark.parametrize(
     ("what", "error", "sentence"),
     [
-        ("nan", SolverError, "solver 'rogue' returned 1 pixels that are not finite"),
+        ("nan", SolverError, "solver 'rogue' returned 1 pixels of 'initial_pressure' that are not finite"),
+        ("huge", SolverError, "solver 'rogue' returned 1 pixels of 'initial_pressure' that are not finite"),
+        ("foreign", PluginError, "solver 'rogue' failed: ZeroDivisionError"),
         ("shape", PluginError, r"solver 'rogue' returned an image of shape \(31, 32\)"),
         ("nothing", PluginError, "solver 'rogue' ended without yielding an image"),
         ("raises", SolverError, "no luck today"),
@@ -147,6 +167,24 @@ def test_a_scan_of_which_every_frame_fails_leaves_no_result(small_scan, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("broken", [1, 2])
+def test_a_frame_that_preprocessing_refuses_leaves_the_others(small_scan, tmp_path, broken):
+    """A frame refused by a preprocessor (an energy of zero) is recorded, be it the first or another one."""
+    energy = np.ones((2, 1))
+    energy[broken - 1] = 0
+    stored = run_frames(small("lsqr"), replace(small_scan, pulse_energy=energy), tmp_path / "out.zarr")
+    assert list(stored.failed) == [broken - 1]
+    assert stored.frame(2 - broken)["initial_pressure"].values.any()
+
+
+def test_an_operator_is_built_once_for_all_frames(small_scan, tmp_path):
+    """However large an operator says it is, frames share it."""
+    pipeline = small("lsqr").model_copy(update={"forward": Heavy()})
+    Heavy.built.clear()
+    run_frames(pipeline, small_scan, tmp_path / "out.zarr")
+    assert len(Heavy.built) == 1
+
+
 def test_a_dead_channel_does_not_count(small_scan):
     """Whatever a channel marked invalid holds, the image is that without this channel."""
     valid = np.ones((2, 1, 48), bool)
@@ -160,12 +198,14 @@ def test_a_dead_channel_does_not_count(small_scan):
     assert not np.array_equal(first, run(pipeline, small_scan)["initial_pressure"].values)
 
 
-def test_a_weight_rule_is_resolved_once_and_recorded(small_scan):
+def test_a_weight_rule_is_resolved_once_and_recorded(small_scan, tmp_path):
     """With `l-curve` the result holds the pipeline asked for, the number that was chosen, and the curve."""
     result = run(small("lsqr", "reconstruct.weight=l-curve"), small_scan)
     assert result.requested["reconstruct"]["weight"] == "l-curve"
     chosen = result.pipeline["reconstruct"]["weight"]
-    choice = result["initial_pressure"].diagnostics["weight_choice"]
+    result.save(tmp_path / "out.zarr")
+    choice = load(tmp_path / "out.zarr").weight_choice
+    assert choice["curve"][3]["residual_norm"] == result.weight_choice["curve"][3]["residual_norm"]
     assert choice["rule"] == "l-curve"
     assert choice["weight"] == chosen
     assert len(choice["curve"]) >= 10

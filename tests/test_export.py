@@ -14,6 +14,7 @@ import pytest
 import tifffile
 from PIL import Image as Picture
 
+from oatkit.atomic import new_file
 from oatkit.data import Grid, Image
 from oatkit.errors import ResultError, ValidationError
 from oatkit.export import export
@@ -75,7 +76,7 @@ def test_an_hdf5_file_says_what_it_holds(tmp_path: Path) -> None:
             assert tuple(found["wavelengths_nm"]) == WAVELENGTHS_NM
         provenance = json.loads(file["provenance"][0])
     assert provenance["pipeline"]["reconstruct"] == dict(result.pipeline["reconstruct"])
-    assert provenance["images"]["initial_pressure"]["diagnostics"]["relative_gap"] == [3.4e-5, "inf"]
+    assert provenance["images"]["initial_pressure"]["diagnostics"]["relative_gap"] == [3.4e-5, {"$float": "inf"}]
     assert provenance["scan"]["speed_of_sound_m_s"] == 1469.3
 
 
@@ -221,6 +222,15 @@ def test_a_frame_of_a_stored_result_can_be_exported(tmp_path: Path) -> None:
     assert not (tmp_path / "one.h5").exists()
 
 
+def test_the_first_good_frame_is_exported_where_none_is_asked_for(tmp_path: Path) -> None:
+    """Where frames 0 and 1 failed it is frame 2, of every format."""
+    folder = write_frames(tmp_path / "out.zarr", "dark", "dark", make_result(2), make_result(3))
+    for name in ("out.png", "out.ome.tif", "out.h5"):
+        export(folder, tmp_path / name)
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert file["initial_pressure"][()].tobytes() == pressure(2).values.tobytes()
+
+
 def test_an_unknown_ending_names_those_that_exist(tmp_path: Path) -> None:
     """A file name that says no format is refused with the list of formats."""
     for name in ("out.jpg", "out.tif", "out", "png"):
@@ -243,6 +253,28 @@ def test_an_existing_file_is_kept_unless_asked_otherwise(tmp_path: Path) -> None
     folder = write_frames(tmp_path / "out.zarr", make_result())
     with pytest.raises(ResultError, match="lies inside the input"):
         export(folder, folder / "out.png")
+
+
+def test_a_file_that_appears_meanwhile_is_kept(tmp_path: Path) -> None:
+    """A name that is taken while the file is being written is refused at the end too, and nothing hidden stays."""
+
+    def write_late() -> None:
+        with new_file(tmp_path / "out.h5") as hidden:
+            hidden.write_text("late")
+            (tmp_path / "out.h5").write_text("precious")
+
+    with pytest.raises(ResultError) as caught:
+        write_late()
+    text = f"{tmp_path}/out.h5: exists already; choose another name, or ask to overwrite it"
+    assert str(caught.value) == text
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["precious"]
+
+
+def test_a_folder_is_never_replaced_by_a_file(tmp_path: Path) -> None:
+    """Even where overwriting is asked for."""
+    (tmp_path / "out.h5").mkdir()
+    with pytest.raises(ResultError, match=r"out\.h5: is a folder, not a file$"):
+        export(make_result(), tmp_path / "out.h5", overwrite=True)
 
 
 def test_a_write_that_fails_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,13 +1,19 @@
 """The two forward models against closed forms, identities and each other."""
 
+import os
 import pickle
+import shutil
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
 import analytic
+import oatkit
 from oatkit.builtin.forward.arc import Arc
 from oatkit.builtin.forward.immi import Immi
 from oatkit.data import Detectors, Geometry, Grid
@@ -316,6 +322,31 @@ def test_a_grid_that_cannot_be_seen_is_refused(model):
     """A field of view with detectors inside it is a `ValidationError` that gives its size."""
     with pytest.raises(ValidationError, match="lie inside the field of view of 100 x 100 mm"):
         model().operator(arc_of(8), Grid((100, 100), 1e-3))
+
+
+def test_arc_works_where_no_machine_code_can_be_kept(tmp_path):
+    """With neither the package's folder nor the user's fit for a cache, `arc` compiles in memory to the same bits."""
+    package = tmp_path / "oatkit"
+    shutil.copytree(Path(oatkit.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    # A file where a folder should be keeps out even the superuser.
+    (package / "builtin" / "forward" / "__pycache__").write_text("")
+    nowhere = os.fspath(package / "errors.py" / "nowhere")
+    left_out = {"NUMBA_CACHE_DIR", "LOCALAPPDATA"}
+    environment = {k: v for k, v in os.environ.items() if k not in left_out}
+    environment |= {"HOME": nowhere, "XDG_CACHE_HOME": nowhere, "PYTHONPATH": os.fspath(tmp_path)}
+    code = (
+        "import numpy as np, oatkit\n"
+        "from oatkit.builtin.forward import arc, arc_kernels\n"
+        "angles = np.arange(5.0)\n"
+        "detectors = oatkit.Detectors(0.04 * np.column_stack([np.sin(angles), np.cos(angles)]))\n"
+        "grid = oatkit.Grid((9, 8), 1e-3)\n"
+        "operator = arc.Arc().operator(oatkit.Geometry(detectors, 40e6, 1500), grid)\n"
+        "print(arc_kernels.scatter._cache.cache_path, operator.matvec(np.arange(72.0)).tobytes().hex())\n"
+    )
+    run = [sys.executable, "-c", code]
+    found = subprocess.run(run, env=environment, capture_output=True, text=True, check=True, cwd=tmp_path)
+    here = subprocess.run(run, capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["None", here.stdout.split()[-1]]
 
 
 def test_distances_that_single_precision_cannot_resolve_are_refused():

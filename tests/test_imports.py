@@ -14,23 +14,28 @@ SOURCE = Path(oatkit.__file__).parent
 HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg", "h5py", "skimage", "tifffile", "typer")
 
 ORDER = [
-    {"errors", "names", "vectors"},
-    {"data", "atomic", "plain", "page"},
-    {"parameters"},
-    {"problem"},
+    {"errors", "names", "vectors", "laplacian"},
+    {"data", "atomic", "threads", "plain", "page", "hostile"},
+    {"parameters", "checked", "metrics", "scale", "scanfile"},
+    {"problem", "masking"},
     {"api"},
-    {"masking", "threads", "memo", "metrics", "hostile", "hookspecs"},
-    {"weights", "registry", "scanfile"},
-    {"pipeline", "reading", "simulate"},
-    {"provenance", "result", "manifest", "store_writer", "store"},
-    {"engine", "figure", "describe"},
+    {"blame", "hookspecs", "simulate"},
+    {"registry", "weights"},
+    {"pipeline", "reading"},
+    {"provenance", "result"},
+    {"manifest", "memo"},
+    {"store_writer", "figure"},
+    {"store", "engine", "describe"},
     {"batch", "export", "summary", "progress"},
     {"demo"},
     {"cli"},
 ]
-"""Layers of modules from the ground up: a module imports only from layers below its own, or its own."""
+"""Layers of modules from the ground up: a module imports only from layers below its own."""
 
-FOR_BUILTINS = {"api", "data", "errors", "problem", "scanfile", "hostile", "threads", "masking", "spectra", "vectors"}
+UPWARDS = {("result", "store")}
+"""The one exception: `Result.save` is promised, and imports the store when it is called."""
+
+FOR_BUILTINS = {"api", "data", "errors", "laplacian", "scanfile", "hostile", "threads", "masking", "spectra", "vectors"}
 
 
 def imported(path: Path) -> set[str]:
@@ -52,7 +57,7 @@ def module_of(path: Path) -> str:
 
 @pytest.mark.parametrize("path", sorted(SOURCE.rglob("*.py")), ids=lambda p: str(p.relative_to(SOURCE)))
 def test_imports_run_one_way(path):
-    """A module imports only from its own layer or below; nobody imports `builtin`, which imports only what is its."""
+    """A module imports only from below its own layer; nobody imports `builtin`, which imports only what is its."""
     module = module_of(path)
     if module == "__init__":
         return
@@ -63,7 +68,8 @@ def test_imports_run_one_way(path):
     layer = {name: level for level, names_ in enumerate(ORDER) for name in names_}
     assert module in layer, f"{module} has no layer: give it one in ORDER"
     assert "builtin" not in names
-    assert all(layer[name] <= layer[module] for name in names), {n: layer[n] for n in names if layer[n] > layer[module]}
+    wrong = [name for name in names if layer[name] >= layer[module] and (module, name) not in UPWARDS]
+    assert not wrong, f"{module} imports {wrong}, which are not below it"
 
 
 def loaded_after(code: str) -> set[str]:

@@ -80,6 +80,11 @@ def test_all_errors_of_a_file_are_reported_at_once():
     ("text", "sentence"),
     [
         ("a = ", "p.toml: not valid TOML"),
+        ("version = true\n[forward]\nuse = 'arc'\n[reconstruct]\nuse = 'lsqr'", "p.toml version: must be 1, got true"),
+        ("[forward]\nuse = 'arc'\n[reconstruct]\nuse = 'lsqr'\n[grid]\npixels = 2", "p.toml [grid]: pixel_size_m"),
+        ("reconstruct = 'lsqr'", "write { use = "),
+        ("a = " + "9" * 5000, "p.toml: not valid TOML"),
+        ("a = " + "[" * 50_000, "p.toml: not valid TOML"),
         ("version = 1\nversion = 1", "p.toml: not valid TOML: Cannot overwrite a value"),
         ("version = 1\n[reconstruct]\nuse = 'lsqr'", "p.toml [forward]: is missing: a pipeline needs a forward model"),
         ("forward = 3\n[reconstruct]\nuse = 'lsqr'", "p.toml forward: must be a forward model, got 3"),
@@ -134,6 +139,8 @@ def test_changing_use_drops_the_keys_of_the_old_plugin():
         ("reconstruct.weight", "expected slot.key=value"),
         ("preprocess.band-pas.high=1", "did you mean 'band-pass'"),
         ("grid.pixels.deep=1", "is a value, not a table"),
+        ("preprocess.offset=1", "is a list of steps"),
+        ("grid.pixels=" + "9" * 5000, "too long a number"),
         ("reconstruct.wieght=1", "did you mean 'weight'"),
     ],
 )

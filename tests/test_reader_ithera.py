@@ -1,5 +1,6 @@
 """The iThera reader, on the real scan and on hand-written ones of every version."""
 
+import os
 import pickle
 import tracemalloc
 from datetime import UTC, datetime
@@ -289,6 +290,20 @@ def signals(tmp_path_factory):
     """Signals of shape (3, 2, 5, 8) with their records in disorder."""
     text = header(pulses=[700, 800] * 3, offsets=[5, 0, 4, 1, 3, 2])
     return IThera().read(write(tmp_path_factory.mktemp("lazy"), text, records=6)).signals
+
+
+def test_a_moved_folder_is_the_same_scan(tmp_path):
+    """Fingerprints come from header and signals alone: not from the path nor from the times of the files."""
+    before = IThera().read(write(tmp_path / "here", header()))
+    (tmp_path / "here").rename(tmp_path / "there")
+    for file in (tmp_path / "there").iterdir():
+        os.utime(file, (0, 0))
+    after = IThera().read(tmp_path / "there")
+    assert after.signals == before.signals
+    assert after.fingerprint == before.fingerprint
+    with open(tmp_path / "there" / "Scan_1.bin", "r+b") as file:
+        file.write(b"x")
+    assert IThera().read(tmp_path / "there").fingerprint != before.fingerprint
 
 
 @given(index=basic_indices((3, 2, 5, 8), allow_newaxis=False))

@@ -1,6 +1,9 @@
 """Plugins come in through entry points; a broken one costs nobody else anything."""
 
 import json
+import os
+import subprocess
+import sys
 
 import pytest
 
@@ -22,12 +25,28 @@ class Landweber(Solver):
         x = 0 * problem.back_projected
         for i in range(self.n_iterations):
             x = x - problem.adjoint(problem.forward(x) - problem.data) / problem.norm**2
-            yield Iterate(x, i + 1, converged=i + 1 == self.n_iterations, reason="all steps done")
+            yield Iterate(x, i + 1, converged=i + 1 == self.n_iterations)
 
 @hookimpl
 def oatkit_solvers():
     return [Landweber]
 '''
+
+RUDE = """
+from oatkit.api import Reader, hookimpl
+
+class Rude(Reader):
+    name = "rude"
+
+    def can_read(self, path):
+        raise RuntimeError("not today")
+
+    def read(self, path): ...
+
+@hookimpl
+def oatkit_readers():
+    return [Rude]
+"""
 
 BROKEN = {
     "import-error": ("import no_such_module_anywhere", "no_such_module_anywhere"),
@@ -43,18 +62,20 @@ BROKEN = {
         "@hookimpl\ndef oatkit_solvers(): return [A]",
         "lacks the method iterate",
     ),
+    "needs-arguments": (GOOD.format(name="needy").replace("param(5,", "param(...,"), "is missing"),
     "bad-name": (GOOD.format(name="Not A Name"), "no plugin name"),
 }
 
 
 @pytest.fixture(scope="module")
 def packages(tmp_path_factory):
-    """A folder with a good package, two that share a name, one that takes a built-in's, and ten broken ones."""
+    """A folder with a good package, two that share a name, one that takes a built-in's, and broken ones."""
     target = tmp_path_factory.mktemp("site") / "packages"
     install(target, "oatkit-good", GOOD.format(name="landweber"), "2.5")
     install(target, "oatkit-first", GOOD.format(name="twin"))
     install(target, "oatkit-second", GOOD.format(name="twin"))
     install(target, "oatkit-shadow", GOOD.format(name="lsqr"))
+    install(target, "oatkit-rude", RUDE)
     for name, (module, _) in BROKEN.items():
         install(target, f"oatkit-{name}", module)
     return target
@@ -84,7 +105,7 @@ def test_a_broken_plugin_is_listed_with_its_reason(listed, name):
 
 
 def test_the_rest_works_beside_broken_plugins(listed):
-    """Every built-in is fine in the company of ten broken packages."""
+    """Every built-in is fine in the company of broken packages."""
     ours = [row for row in listed if row["distribution"] == "oatkit"]
     assert {row["name"] for row in ours} == {e.name for e in installed().entries if e.distribution == "oatkit"}
     assert {row["status"] for row in ours} == {"ok"}
@@ -104,6 +125,29 @@ def test_a_full_name_is_never_ambiguous(packages):
     done = run_oatkit("describe", "oatkit-second:twin", path=packages)
     assert done.returncode == 0
     assert "solver twin   (oatkit-second 1.0)" in done.stdout
+
+
+def test_a_full_name_survives_writing_and_reading(packages, small_scan_file, tmp_path):
+    """A pipeline that names one of two twins, or a plugin named like a built-in, is written with the full name."""
+    code = (
+        "import oatkit\n"
+        "for name in ('oatkit-second:twin', 'oatkit-shadow:lsqr'):\n"
+        "    one = oatkit.Pipeline.load('lsqr', [f'reconstruct.use={name}'])\n"
+        "    again = oatkit.Pipeline.loads(one.to_toml())\n"
+        "    assert again == one and type(again.reconstruct).__module__ != 'oatkit.builtin.solvers.lsqr'\n"
+        "    print(again.model_dump()['reconstruct']['use'])\n"
+    )
+    environment = dict(os.environ, PYTHONPATH=str(packages))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+    assert done.stdout.split() == ["oatkit-second:twin", "oatkit-shadow:lsqr"], done.stderr
+
+
+def test_a_reader_that_raises_does_not_keep_others_from_reading(packages, small_scan_file):
+    """With a reader installed whose `can_read` raises, other files are still read."""
+    assert run_oatkit("info", str(small_scan_file), path=packages).returncode == 0
+    done = run_oatkit("info", str(packages), path=packages)
+    assert done.returncode == 4
+    assert "reader 'rude' failed: RuntimeError" in done.stderr
 
 
 def test_a_built_in_cannot_be_shadowed(packages, listed):

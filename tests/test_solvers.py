@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -18,11 +19,13 @@ from oatkit.builtin.solvers.lsqr import Lsqr
 from oatkit.builtin.solvers.lsqr_threshold import LsqrThreshold
 from oatkit.builtin.solvers.nnls import Nnls
 from oatkit.errors import SolverError, ValidationError
+from oatkit.masking import without_rows
 from oatkit.registry import installed
-from small_problems import PROBLEMS, blurred, circles, dense, noise_like, scaled, too_few_data
+from small_problems import PROBLEMS, Counting, blurred, circles, dense, noise_like, scaled, too_few_data
 
 INSTALLED = installed().of_kind("solver")
 QUADRATIC = [Lsqr, LsqrThreshold, Nnls]
+WEIGHTED = [cls for cls in INSTALLED if "weight" in cls.model_fields]
 
 
 def placed(problem):
@@ -72,25 +75,38 @@ def test_every_solver_is_deterministic(cls):
 def test_every_solver_can_be_cancelled_between_products(cls):
     """No more than two applications of the operator or its adjoint, each way, lie between two iterates."""
     problem = placed(circles())
-    calls = []
-
-    class Counting:
-        shape = problem.operator.shape
-
-        def matvec(self, image):
-            calls.append("forward")
-            return problem.forward(image)
-
-        def rmatvec(self, data):
-            calls.append("adjoint")
-            return problem.adjoint(data).ravel()
-
-    steps = cls().iterate(Problem(Counting(), problem.data, problem.shape, problem.geometry, problem.grid))
-    before = 0
+    operator = Counting(problem)
+    steps = cls().iterate(Problem(operator, problem.data, problem.shape, problem.geometry, problem.grid))
+    before = (0, 0)
     for _ in islice(steps, 60):
-        assert max(calls[before:].count("forward"), calls[before:].count("adjoint")) <= 2
-        before = len(calls)
+        now = (operator.forwards, operator.adjoints)
+        assert max(now[0] - before[0], now[1] - before[1]) <= 2
+        before = now
     steps.close()
+
+
+@pytest.mark.parametrize("scaling", ["relative", "absolute"])
+@pytest.mark.parametrize("make", [circles, too_few_data])
+@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+def test_products_count_every_application(cls, make, scaling):
+    """Products are the calls of the operator and of its adjoint, the setting of the scale included, give or take one;
+    with the scale known from another problem they are said to be the same.
+    """
+    problem = placed(make())
+    operator = Counting(problem)
+    solver = cls(scaling=scaling) if "scaling" in cls.model_fields else cls()
+    again = Problem(operator, problem.data, problem.shape, problem.geometry, problem.grid)
+    last = solver.solve(again)
+    assert abs(operator.forwards - last.products) <= 1
+    assert operator.adjoints == 0 or abs(operator.adjoints - last.products) <= 1
+    assert solver.solve(replace(again)).products == last.products
+
+
+@pytest.mark.parametrize("cls", QUADRATIC, ids=named)
+def test_norm_is_sought_only_where_it_is_used(cls):
+    """With an absolute weight LSQR starts at once, and only `nnls`, whose steps need it, determines the norm."""
+    first = next(cls(scaling="absolute").iterate(circles()))
+    assert first.iteration == (0 if cls is Nnls else 1)
 
 
 @pytest.mark.parametrize("cls", INSTALLED, ids=named)
@@ -111,14 +127,34 @@ def test_every_solver_follows_the_scale(cls):
     np.testing.assert_allclose(other * 50.0 / 1e-3, one, atol=1e-5 * abs(one).max())
 
 
-@pytest.mark.parametrize("weight", [1e-12, 1e-6, 1e6, 1e12])
-@pytest.mark.parametrize("cls", [cls for cls in INSTALLED if "weight" in cls.model_fields], ids=named)
-def test_every_solver_survives_absurd_weights(cls, weight):
+@pytest.mark.parametrize("scaling", ["relative", "absolute"])
+@pytest.mark.parametrize("weight", [1e-299, 1e-150, 1e-12, 1e-6, 1e6, 1e12, 1e150, 1e290])
+@pytest.mark.parametrize("cls", WEIGHTED, ids=named)
+def test_every_solver_survives_absurd_weights(cls, weight, scaling):
     """The image stays finite, and there is a reason."""
     for problem in (circles(), too_few_data()):
-        last = cls(weight=weight, n_iterations=50).solve(placed(problem))
+        last = cls(weight=weight, scaling=scaling, n_iterations=50).solve(placed(problem))
         assert np.isfinite(last.image).all()
         assert last.reason
+
+
+@pytest.mark.parametrize("scaling", ["relative", "absolute"])
+@pytest.mark.parametrize("weight", [1e-305, 1e305])
+@pytest.mark.parametrize("cls", WEIGHTED, ids=named)
+def test_weights_without_a_place_among_floats_are_refused(cls, weight, scaling):
+    """A weight that leaves no room for products is a `ValidationError` that gives the range."""
+    with pytest.raises(ValidationError, match="leaves the range of 1e-300 to 1e\\+300"):
+        cls(weight=weight, scaling=scaling).solve(placed(circles()))
+
+
+@pytest.mark.parametrize("cls", QUADRATIC, ids=named)
+def test_no_convergence_is_claimed_where_numbers_are_too_small_to_square(cls):
+    """At 1e200 times the norm the optimum is a constant image of order 1; whoever has not found it does not say so."""
+    last = cls(weight=1e200).solve(noise_like())
+    matrix = dense(noise_like())
+    flat = max(0.0, matrix.sum(axis=1) @ noise_like().data / np.sum(matrix.sum(axis=1) ** 2))
+    assert flat > 0.01
+    assert not last.converged or last.image == pytest.approx(flat, rel=0.05)
 
 
 @pytest.mark.parametrize("cls", INSTALLED, ids=named)
@@ -272,6 +308,43 @@ def test_backprojection_takes_degenerate_arrays(count):
     doubled = Geometry(Detectors(np.vstack([few.detectors.positions_m] * 2)), 40e6, 1000, 15e-6)
     for geometry in (few, doubled):
         assert np.isfinite(Backprojection().solve(seen_by(geometry, image, grid)).image).all()
+
+
+def test_backprojection_leaves_out_what_is_not_valid():
+    """With every second detector and a block of others invalid, the image is that of the array without them."""
+    grid = Grid((40, 40), 5e-4)
+    image = np.zeros(grid.shape)
+    image[10:20, 15:30] = 1
+    whole = seen_by(ring(), image, grid)
+    valid = np.arange(128) % 2 == 0
+    valid[30:50] = False
+    rows = np.repeat(valid, 1000)
+    masked = Problem(without_rows(whole.operator, rows), np.where(rows, whole.data, 0), grid.shape, ring(), grid, valid)
+    kept = replace(ring(), detectors=Detectors(ring().detectors.positions_m[valid]))
+    found, expected = (Backprojection().solve(p) for p in (masked, seen_by(kept, image, grid)))
+    np.testing.assert_allclose(found.image, expected.image, atol=1e-6 * abs(expected.image).max())
+    assert found.iteration == valid.sum()
+
+
+def test_backprojection_without_a_valid_detector_is_zero():
+    """Where no detector is valid the image is zero, and that is said."""
+    problem = seen_by(ring(), np.ones((20, 20)), Grid((20, 20), 1e-3))
+    none = np.zeros(128, dtype=bool)
+    operator, data = without_rows(problem.operator, np.repeat(none, 1000)), 0 * problem.data
+    last = Backprojection().solve(Problem(operator, data, problem.shape, problem.geometry, problem.grid, none))
+    assert not last.image.any()
+    assert "zero" in last.reason
+
+
+def test_backprojection_leaves_out_records_that_miss_the_pixel():
+    """A second ring, so far away that its records end before any sound arrives, changes nothing."""
+    grid = Grid((40, 40), 5e-4)
+    image = np.zeros(grid.shape)
+    image[10:20, 15:30] = 1
+    near = ring(64)
+    both = replace(near, detectors=Detectors(np.vstack([near.detectors.positions_m, 10 * near.detectors.positions_m])))
+    found, expected = (Backprojection().solve(seen_by(g, image, grid)).image for g in (both, near))
+    np.testing.assert_allclose(found, expected, atol=1e-6 * abs(expected).max())
 
 
 def test_backprojection_needs_to_know_where():

@@ -1,14 +1,15 @@
 """The choice of weights: Shaw's problem, hold-out of detectors, and what is said of a choice."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
 
 import oatkit
 from oatkit import weights
 from oatkit.api import Detectors, Geometry, Problem
 from oatkit.errors import ValidationError
-from oatkit.weights import CANDIDATES, choose, gcv, l_curve_chord, l_curve_corner, resolve
+from oatkit.weights import CANDIDATES, choose, l_curve_chord, l_curve_corner, resolve
 from small_problems import blurred, circles, dense
 
 SHAW_DATA = [
@@ -64,29 +65,6 @@ def test_chord_lies_near_the_corner_of_an_l():
     assert l_curve_corner(*curve) == l_curve_chord(*curve) == 5
 
 
-def test_gcv_of_shaws_problem(shaw):
-    """The minimum of the generalised cross-validation function is the library's."""
-    singular, coefficients, lambdas = shaw
-    best = int(np.argmin(gcv(singular, coefficients, 0.0, 20, lambdas**2)))
-    bracket = np.log(lambdas[[best + 1, best - 1]])
-    found = minimize_scalar(
-        lambda t: float(gcv(singular, coefficients, 0.0, 20, np.exp(2 * t))), bounds=bracket, method="bounded",
-        options={"xatol": 1e-10},
-    )  # fmt: skip
-    assert np.exp(found.x) == pytest.approx(1.24921780949e-05, rel=1e-7)
-
-
-def test_gcv_is_what_a_direct_solve_gives():
-    """|A x - b|^2 over the squared trace of 1 - A (A^T A + w)^-1 A^T, written out for a tall matrix."""
-    rng = np.random.default_rng(0)
-    matrix, data, w = rng.standard_normal((9, 5)), rng.standard_normal(9), 0.3
-    left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
-    coefficients = left.T @ data
-    influence = matrix @ np.linalg.solve(matrix.T @ matrix + w * np.eye(5), matrix.T)
-    expected = np.sum((influence @ data - data) ** 2) / np.trace(np.eye(9) - influence) ** 2
-    assert gcv(singular, coefficients, data @ data - coefficients @ coefficients, 9, w) == pytest.approx(expected)
-
-
 def with_geometry(problem, detectors=16):
     """The problem with a geometry of so many detectors."""
     angle = np.linspace(0, 4, detectors)
@@ -136,6 +114,21 @@ def test_every_solver_with_a_weight_takes_every_rule(name, rule):
     assert choice.weight in CANDIDATES
     assert np.isfinite(solver.solve(circles()).image).all()
     assert set(dict(choice.picks)) == {"curvature", "chord"} | ({"prediction"} if rule == "hold-out" else set())
+
+
+def test_detectors_kept_back_are_not_valid():
+    """The problem that is solved at each weight counts neither the held-out detectors nor those out of use before."""
+    seen = []
+
+    class Watching(oatkit.plugin("solver", "lsqr")):
+        def descend(self, problem, weight):
+            seen.append(problem.valid)
+            return super().descend(problem, weight)
+
+    problem = replace(with_geometry(circles()), valid=np.arange(16) != 5)
+    choose(Watching(), problem, "hold-out")
+    assert len(seen) == len(CANDIDATES)
+    assert all(valid.tolist() == [i not in (3, 5, 10) for i in range(16)] for valid in seen)
 
 
 def test_number_is_left_alone():

@@ -18,7 +18,8 @@ import pluggy
 from oatkit.data import Detectors, Geometry, Grid, Image, Optics, Scan, Signals
 from oatkit.errors import OatkitError, PluginError, ReadError, SolverError, ValidationError
 from oatkit.parameters import Parameters, param
-from oatkit.problem import Iterate, Problem, Reference, UnmixProblem
+from oatkit.problem import Iterate, Problem, UnmixProblem
+from oatkit.scale import Reference
 
 __all__ = [
     "KINDS", "Detectors", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image", "Iterate", "OatkitError",
@@ -56,7 +57,9 @@ class Preprocessor(Plugin):
 
     It gets a scan of one frame. The geometry of what it returns may depend on the geometry and the parameters alone,
     never on the signals, since the operator is built once for a scan: a filter convolves its response into
-    ``geometry.impulse_response``. Channels not to be trusted are marked in ``scan.valid``.
+    ``geometry.impulse_response``. Records may become shorter (a crop moves ``start_time_s`` and ``n_samples``); frames,
+    wavelengths and detectors stay. Channels not to be trusted are marked in ``scan.valid``. Bad signals are a
+    `ReadError`, bad parameters a `ValidationError`.
     """
 
     kind: ClassVar[str] = "preprocessor"

@@ -22,14 +22,14 @@ def check_output(path: Path, inputs: Iterable[str] = (), overwrite: bool = False
     """
     path = Path(path).absolute()
     if not path.parent.is_dir():
-        raise ResultError(f"{path}: the folder {path.parent} does not exist")
+        raise ResultError(f"{path}: its folder does not exist")
     if not os.access(path.parent, os.W_OK | os.X_OK):
-        raise ResultError(f"{path}: the folder {path.parent} is read-only")
+        raise ResultError(f"{path}: its folder is read-only")
     for given in inputs:
         if given and os.path.exists(given):
             _check_apart(path.resolve(), Path(given).resolve())
     if os.path.lexists(path) and not overwrite:
-        raise ResultError(f"{path} exists already; choose another name, or ask to overwrite it")
+        raise ResultError(f"{path}: exists already; choose another name, or ask to overwrite it")
 
 
 def check_space(path: Path, size: int) -> None:
@@ -52,15 +52,25 @@ def sync(path: Path) -> None:
 
 def write_file(path: Path, content: bytes, overwrite: bool = False) -> None:
     """Write a whole file, or raise `ResultError` and leave what was there."""
-    check_output(path, overwrite=overwrite)
+    with new_file(path, overwrite) as hidden:
+        check_space(path, len(content))
+        hidden.write_bytes(content)
+
+
+@contextmanager
+def new_file(path: Path, overwrite: bool = False) -> Iterator[Path]:
+    """Yield a hidden path beside `path` for a file that takes this name when the block ends well, else vanishes.
+
+    A file that stands there is replaced if `overwrite`, at the last moment. Raises `ResultError`, also in place of an
+    `OSError` in the block.
+    """
     path = Path(path).absolute()
-    if path.is_dir():
-        raise ResultError(f"{path} is a folder, not a file")
-    check_space(path, len(content))
+    _check_file(path, overwrite)
     hidden = _hidden(path)
     try:
-        hidden.write_bytes(content)
+        yield hidden
         sync(hidden)
+        _check_file(path, overwrite)
         os.replace(hidden, path)
         sync(path.parent)
     except OSError as error:
@@ -93,13 +103,19 @@ def _hidden(path: Path) -> Path:
     return path.with_name(f".{path.name}.partial-{os.getpid()}-{secrets.token_hex(3)}")
 
 
+def _check_file(path: Path, overwrite: bool) -> None:
+    check_output(path, overwrite=overwrite)
+    if path.is_dir():
+        raise ResultError(f"{path}: is a folder, not a file")
+
+
 def _check_apart(output: Path, given: Path) -> None:
     if output == given:
-        raise ResultError(f"{output} is the input; choose another name for the output")
+        raise ResultError(f"{output}: is the input; choose another name for the output")
     if given in output.parents:
-        raise ResultError(f"{output} lies inside the input {given}; choose another place for the output")
+        raise ResultError(f"{output}: lies inside the input {given}; choose another place for the output")
     if output in given.parents:
-        raise ResultError(f"{output} contains the input {given}; choose another place for the output")
+        raise ResultError(f"{output}: contains the input {given}; choose another place for the output")
 
 
 def _put_in_place(hidden: Path, path: Path, overwrite: bool) -> None:

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from oatkit.data import Scan
-from oatkit.engine import Event, resolve, run_resolved
-from oatkit.errors import PluginError, SolverError, ValidationError
+from oatkit.engine import Listener, ignore, resolve, run_resolved
+from oatkit.errors import OatkitError, ValidationError
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.result import Result
@@ -17,7 +17,7 @@ def run_frames(
     scan: Scan,
     path: str | Path,
     frames: Iterable[int] | None = None,
-    on_event: Callable[[Event], None] = lambda event: None,
+    on_event: Listener = ignore,
     on_frame: Callable[[int], None] = lambda frame: None,
     overwrite: bool = False,
 ) -> Result:
@@ -33,15 +33,18 @@ def run_frames(
         raise ValidationError(f"frames {missing or chosen}: the scan has frames 0 .. {scan.frames - 1}")
     with StoreWriter(path, frames=len(chosen), source=scan.source, overwrite=overwrite) as writer:
         memo = Memo()
-        resolved, choice = resolve(pipeline, scan, memo)
+        scan.geometry.check_grid(pipeline.grid.grid())  # a slip of the pipeline's is not each frame's failure
+        resolved, choice = resolve(pipeline, scan, memo, on_event)
         failures = []
         for index, frame in enumerate(chosen):
             try:
-                writer.write(index, run_resolved(resolved, pipeline, choice, scan, frame, memo, on_event))
-            except (PluginError, SolverError) as error:
+                result = run_resolved(resolved, pipeline, choice, scan, frame, memo, on_event)
+            except OatkitError as error:
                 failures.append(error)
-                if len(failures) == len(chosen):
-                    raise
                 writer.fail(index, f"frame {frame}: {error}")
+            else:
+                writer.write(index, result)
             on_frame(frame)
+        if len(failures) == len(chosen):
+            raise failures[0]
     return load(path)

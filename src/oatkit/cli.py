@@ -7,9 +7,11 @@ Exit codes: 0 done, 1 the result could not be written, 2 usage or invalid pipeli
 import functools
 import json
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -36,7 +38,7 @@ INTERRUPTED = 130
 Command = Callable[..., Any]
 
 ScanPath = Annotated[
-    Path, typer.Argument(metavar="SCAN", help="The scan: an iThera .msot file, or an oatkit .h5 scan.")
+    Path, typer.Argument(metavar="SCAN", readable=False, help="The scan: an iThera .msot file, or an oatkit .h5 scan.")
 ]
 ResultPath = Annotated[Path, typer.Argument(metavar="OUT.zarr", help="A result that `oatkit run` has written.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")]
@@ -48,8 +50,19 @@ Changes = Annotated[
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line; asked to end, by SIGTERM or a closed terminal, it cleans up behind itself."""
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _terminate)
     app()
+
+
+class Terminated(BaseException):
+    """A signal asked the command to end; its number is the text."""
+
+
+def _terminate(number: int, frame: Any) -> None:
+    raise Terminated(number)
 
 
 def command(function: Command) -> Command:
@@ -63,21 +76,31 @@ def command(function: Command) -> Command:
             if os.environ.get("OATKIT_DEBUG"):
                 raise
             _complain(str(error))
-            raise typer.Exit(EXIT_CODES.get(type(error), 1)) from None
+            raise typer.Exit(next((code for kind, code in EXIT_CODES.items() if isinstance(error, kind)), 1)) from None
         except KeyboardInterrupt:
             _complain("interrupted")
             raise typer.Exit(INTERRUPTED) from None
+        except Terminated as signalled:
+            _complain("terminated")
+            raise typer.Exit(128 + int(str(signalled))) from None
         except BrokenPipeError:
             # The reader of our output has gone (`oatkit info ... | head`): nothing is left to say.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(0) from None
+        except OSError as error:
+            if os.environ.get("OATKIT_DEBUG"):
+                raise
+            _complain(str(error))
+            raise typer.Exit(1) from None
 
     return app.command(name=function.__name__.removesuffix("_"))(guarded)
 
 
 def _complain(text: str) -> None:
     for line in text.splitlines():
-        typer.echo(f"oatkit: {line}", err=True)
+        # Names from files must not steer the terminal.
+        shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in line)
+        typer.echo(f"oatkit: {shown}", err=True)
 
 
 class Phantom(StrEnum):
@@ -112,7 +135,7 @@ def info(scan: ScanPath, as_json: AsJson = False) -> None:
     from oatkit.reading import read
 
     found = read(scan)
-    typer.echo(json.dumps(scan_table(found), indent=2) if as_json else scan_text(found))
+    typer.echo(json.dumps(scan_table(found), indent=2, allow_nan=False) if as_json else scan_text(found))
 
 
 @command
@@ -137,8 +160,7 @@ def run(
     loaded = Pipeline.load(pipeline, changes)
     found = read(scan)
     chosen = _frames(frames, found.frames)
-    if output.exists() and not overwrite:
-        raise ValidationError(f"{output}: already exists; choose another name or add --overwrite")
+    _check_new(output, overwrite)
     with ProgressBar(len(chosen)) as bar:
         result = run_frames(
             loaded, found, output, chosen, bar.show, on_frame=lambda frame: bar.next_frame(), overwrite=overwrite
@@ -206,15 +228,14 @@ def simulate(
     snr: Annotated[
         float, typer.Option(help="Signal to noise in dB, in the window that the field of view reaches.")
     ] = 32.0,
-    seed: Annotated[int, typer.Option(help="Seed of the noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     overwrite: Overwrite = False,
 ) -> None:
     """Simulate a scan of a phantom on a finer grid than the one that reconstructs, and write it with the truth."""
     from oatkit.demo import simulated
     from oatkit.scanfile import write_scan
 
-    if output.exists() and not overwrite:
-        raise ValidationError(f"{output}: already exists; choose another name or add --overwrite")
+    _check_new(output, overwrite)
     scan, truth = simulated(phantom.value, snr, seed)
     write_scan(scan, output, truth, overwrite=overwrite)
     typer.echo(f"wrote {output}: {phantom.value} phantom, {snr:g} dB, seed {seed}")
@@ -224,13 +245,14 @@ def simulate(
 def export(
     result: ResultPath,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Ends in .png (figure), .ome.tif or .h5.")],
-    frame: Annotated[int, typer.Option(help="Which frame of the result.")] = 0,
+    frame: Annotated[int | None, typer.Option(help="Which frame of the result; else the first one.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Write the images of a result as a figure, an OME-TIFF or an HDF5 file."""
     from oatkit.export import export as write
 
-    write(_stored(result), file, frame, overwrite=overwrite)
+    _check_new(file, overwrite)
+    write(_stored(result, frame), file, overwrite=overwrite)
     typer.echo(f"wrote {file}")
 
 
@@ -247,12 +269,20 @@ def verify(result: ResultPath) -> None:
     typer.echo(f"{result}: complete, all checksums right")
 
 
-def _stored(path: Path) -> Any:
-    """Open a result; a damaged one is unreadable input."""
+def _check_new(path: Path, overwrite: bool) -> None:
+    """Refuse, before any work is done, to write over what is there."""
+    if os.path.lexists(path) and not overwrite:
+        raise ValidationError(f"{path}: exists already; choose another name or add --overwrite")
+
+
+def _stored(path: Path, frame: int | None) -> Any:
+    """Read one frame of a result, the first good one unless said; a damaged result is unreadable input."""
     from oatkit.store import load
 
     try:
-        return load(path)
+        stored = load(path)
+        chosen = stored if frame is None else stored.frame(frame)
+        return replace(chosen, images=dict(chosen))
     except ResultError as error:
         raise ReadError(str(error)) from None
 

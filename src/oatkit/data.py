@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -18,7 +18,10 @@ from oatkit.errors import ValidationError
 
 
 def read_only(values: Any, dtype: Any = None) -> np.ndarray:
-    """Return a copy of `values` that nobody can write to."""
+    """Return a copy of `values` that nobody can write to; an array that is such already is returned as it is."""
+    alike = isinstance(values, np.ndarray) and dtype in (None, values.dtype)
+    if alike and values.base is None and not values.flags.writeable:
+        return values
     array = np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array
@@ -36,14 +39,18 @@ def check_range(what: str, values: Any, lowest: float, highest: float, hint: str
 class ByContent:
     """Equality, hash and pickling by content, for frozen dataclasses that hold arrays."""
 
+    texts: ClassVar[frozenset[str]] = frozenset()
+    """Fields that say where the content comes from and are no part of it."""
+
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of the content, in hexadecimal."""
         digest = hashlib.sha256(type(self).__name__.encode())
         for entry in fields(self):  # type: ignore[arg-type]
-            digest.update(entry.name.encode())
-            for piece in _pieces(getattr(self, entry.name)):
-                digest.update(piece)
+            if entry.name not in self.texts:
+                digest.update(entry.name.encode())
+                for piece in _pieces(getattr(self, entry.name)):
+                    digest.update(piece)
         return digest.hexdigest()
 
     def __eq__(self, other: object) -> bool:
@@ -76,10 +83,16 @@ def _pieces(value: Any) -> Iterator[bytes]:
         for key in sorted(value):
             yield str(key).encode()
             yield from _pieces(value[key])
+    elif isinstance(value, tuple | list):
+        yield f"{len(value)} items".encode()
+        for item in value:
+            yield from _pieces(item)
     elif hasattr(value, "fingerprint"):
         yield value.fingerprint.encode()
-    else:
+    elif value is None or isinstance(value, str | bytes | bool | int | float | np.generic):
         yield repr(value).encode()
+    else:
+        raise TypeError(f"{type(value).__name__} has no content to compare; keep plain values and arrays")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +110,7 @@ class Grid(ByContent):
     """Where the middle of the image lies, ``(y, x)``, m."""
 
     def __post_init__(self) -> None:
-        if len(self.shape) != 2 or not all(int(n) == n and n >= 1 for n in self.shape):
+        if len(self.shape) != 2 or not all(n >= 1 and int(n) == n for n in self.shape):
             raise ValidationError(f"grid shape: expected (ny, nx) of at least (1, 1), got {self.shape}")
         object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
         object.__setattr__(self, "pixel_size_m", float(self.pixel_size_m))
@@ -190,9 +203,11 @@ class Geometry(ByContent):
     def __post_init__(self) -> None:
         for name in ("sampling_rate_hz", "start_time_s", "speed_of_sound_m_s"):
             object.__setattr__(self, name, float(getattr(self, name)))
-        object.__setattr__(self, "n_samples", int(self.n_samples))
         check_range("sampling_rate_hz", self.sampling_rate_hz, 1e5, 1e10, "the unit is Hz, so 40 MHz is 40e6")
         check_range("n_samples", self.n_samples, 1, 10_000_000, "a record has at least one sample")
+        if int(self.n_samples) != self.n_samples:
+            raise ValidationError(f"n_samples: must be a whole number, got {self.n_samples}")
+        object.__setattr__(self, "n_samples", int(self.n_samples))
         check_range("start_time_s", self.start_time_s, -1e-2, 1e-2, "the unit is s, so 10 us is 1e-5")
         check_range("speed_of_sound_m_s", self.speed_of_sound_m_s, 300, 7000, "the unit is m/s; water has about 1500")
         if self.impulse_response is not None:
@@ -259,8 +274,12 @@ class Signals(Protocol):
 class Scan(ByContent):
     """Raw pressure signals of a detector array, with all that is known about them.
 
+    Two scans with the same data are equal, whatever they are called and wherever they lie.
+
     Raises `ValidationError` where the shapes of its parts do not fit together or a wavelength is out of range.
     """
+
+    texts: ClassVar[frozenset[str]] = frozenset({"name", "source", "reader", "speed_of_sound_source", "notes"})
 
     signals: Signals
     """Shape ``(frame, wavelength, detector, sample)``, any real dtype, in arbitrary units."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from oatkit.api import ForwardModel
 from oatkit.data import Image, Scan
 from oatkit.engine import run
-from oatkit.errors import ValidationError
+from oatkit.errors import ResultError, ValidationError
 from oatkit.memo import Memo
 from oatkit.metrics import negative_pixels, psnr, rmse, ssim
 from oatkit.pipeline import Pipeline
@@ -34,17 +34,21 @@ def run_demo(folder: Path, overwrite: bool = False) -> Iterator[str]:
 
     Raises `ValidationError` where the folder holds a demo already, unless `overwrite`.
     """
-    figure = folder / "demo.png"
-    if figure.exists() and not overwrite:
-        raise ValidationError(f"{figure}: already exists; choose another folder with -o or add --overwrite")
+    scan_file, figure, saved = (folder / name for name in ("scan.h5", "demo.png", f"{METHODS[-1]}.zarr"))
+    there = [str(path) for path in (scan_file, figure, saved) if path.exists()]
+    if there and not overwrite:
+        raise ValidationError(f"{there[0]}: exists already; choose another folder with -o or add --overwrite")
     from oatkit.figure import write_comparison  # matplotlib
     from oatkit.scanfile import write_scan
 
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultError(f"{folder}: cannot be made: {error.strerror}") from None
     yield f"simulating {WHAT} ..."
     scan, truth = simulated("breast", snr_db=32.0, seed=0)
-    write_scan(scan, folder / "scan.h5", truth, overwrite=overwrite)
-    yield f"wrote {folder / 'scan.h5'}"
+    write_scan(scan, scan_file, truth, overwrite=overwrite)
+    yield f"wrote {scan_file}"
     panels: list[tuple[str, Image, list[str]]] = [("truth", truth, ["the phantom"])]
     memo = Memo()
     for name in METHODS:
@@ -52,8 +56,8 @@ def run_demo(folder: Path, overwrite: bool = False) -> Iterator[str]:
         image = result["initial_pressure"]
         panels.append((name, image, scores(image, truth)))
         yield f"{name}: {', '.join(scores(image, truth))}"
-    result.save(folder / f"{METHODS[-1]}.zarr", overwrite=overwrite)
-    yield f"wrote {folder / METHODS[-1]}.zarr"
+    result.save(saved, overwrite=overwrite)
+    yield f"wrote {saved}"
     title = "One simulated scan, three reconstructions"
     write_comparison(figure, panels, title, WHAT, overwrite)
     yield f"wrote {figure}"

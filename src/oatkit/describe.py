@@ -4,6 +4,8 @@ import inspect
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from oatkit.api import Plugin
 from oatkit.data import Scan
 from oatkit.parameters import Parameters, bounds_of, expected
@@ -56,11 +58,17 @@ def scan_table(scan: Scan) -> dict[str, Any]:
         "speed_of_sound_m_s": geometry.speed_of_sound_m_s,
         "speed_of_sound_source": scan.speed_of_sound_source,
         "impulse_response_samples": 0 if response is None else len(response),
-        "temperature_c": None if scan.temperature_c is None else float(scan.temperature_c.mean()),
+        "temperature_c": _mean(scan.temperature_c),
         "dtype": str(scan.signals.dtype),
         "fingerprint": scan.fingerprint,
         "notes": list(scan.notes),
     }
+
+
+def _mean(values: np.ndarray | None) -> float | None:
+    """Return the mean of what is known, None where nothing is."""
+    known = [] if values is None else values[np.isfinite(values)]
+    return float(np.mean(known)) if len(known) else None
 
 
 def scan_text(scan: Scan) -> str:

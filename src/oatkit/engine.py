@@ -14,6 +14,7 @@ import numpy as np
 
 from oatkit import weights
 from oatkit.api import Iterate, Plugin, Problem, Solver, UnmixProblem
+from oatkit.blame import blame
 from oatkit.data import Grid, Image, Scan
 from oatkit.errors import PluginError, SolverError
 from oatkit.masking import without_rows
@@ -52,14 +53,15 @@ class StepDone:
 
 
 Event = StepStarted | StepIterate | StepDone
+Listener = Callable[[Event], None]
+
+
+def ignore(event: Event) -> None:
+    """Listen to nothing."""
 
 
 def run(
-    pipeline: Pipeline,
-    scan: Scan,
-    frame: int = 0,
-    memo: Memo | None = None,
-    on_event: Callable[[Event], None] = lambda event: None,
+    pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = None, on_event: Listener = ignore
 ) -> Result:
     """Run `pipeline` over one frame of `scan` and return its images, with how they came about.
 
@@ -67,7 +69,7 @@ def run(
     event. Raises an `OatkitError`.
     """
     memo = Memo() if memo is None else memo
-    resolved, choice = resolve(pipeline, scan, memo)
+    resolved, choice = resolve(pipeline, scan, memo, on_event)
     return run_resolved(resolved, pipeline, choice, scan, frame, memo, on_event)
 
 
@@ -78,7 +80,7 @@ def run_resolved(
     scan: Scan,
     frame: int,
     memo: Memo,
-    on_event: Callable[[Event], None],
+    on_event: Listener,
 ) -> Result:
     """Run a pipeline whose weight `resolve` has chosen; `requested` and `choice` are what it came from."""
     images: dict[str, Image] = {}
@@ -90,19 +92,16 @@ def run_resolved(
             images |= event.images
             seconds[event.step] = event.seconds
             notes += event.notes
-    if choice:
-        pressure = images["initial_pressure"]
-        diagnostics = {**pressure.diagnostics, "weight_choice": choice.table()}
-        images["initial_pressure"] = replace(pressure, diagnostics=diagnostics)
     return Result(
         images=images,
         pipeline=resolved.model_dump(),
         requested=requested.model_dump(),
         versions=versions(resolved),
-        scan=describe_scan(resolved.scan.apply(scan)),
+        scan=describe_scan(scan, resolved),
         seconds=seconds,
         warnings=tuple(dict.fromkeys(notes)),
         frame_index=frame,
+        weight_choice=choice.table() if choice else {},
     )
 
 
@@ -110,25 +109,17 @@ def steps(pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = No
     """Yield the events of running `pipeline` over one frame; close the generator to cancel.
 
     Raises `ValidationError` where the weight is still the name of a rule (`resolve` chooses it), `PluginError` where
-    a plugin returns what it may not.
+    a plugin fails or returns what it may not.
     """
     memo = Memo() if memo is None else memo
-    scan = pipeline.scan.apply(scan)
-    grid = pipeline.grid.grid()
-    scan.geometry.check_grid(grid)
-    chain: tuple[Any, ...] = (scan.fingerprint, frame, grid)
-
     yield StepStarted("preprocess")
     start = time.perf_counter()
-    chain = (*chain, pipeline.preprocess)
-    clean = memo.get(chain, lambda: preprocess(pipeline, scan.frame(frame)), _scan_bytes)
-    added = clean.notes[len(scan.notes) :]
-    yield StepDone("preprocess", time.perf_counter() - start, {}, added)
+    clean, grid = preprocess(pipeline, scan, frame, memo), pipeline.grid.grid()
+    yield StepDone("preprocess", time.perf_counter() - start, {}, clean.notes[len(scan.notes) :])
 
-    chain = (*chain, pipeline.forward, pipeline.reconstruct)
+    chain = (*_raw_key(pipeline, scan, frame), pipeline.grid, pipeline.forward, pipeline.reconstruct)
     images: dict[str, Image] = {}
-    first = _memoised(memo, chain, "reconstruct", _reconstruct(pipeline, clean, grid, memo))
-    for event in first:
+    for event in _memoised(memo, chain, "reconstruct", _reconstruct(pipeline, clean, grid, memo)):
         yield event
         images |= _images_of(event)
     for name in ("segment", "unmix"):
@@ -141,37 +132,33 @@ def steps(pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = No
             images |= _images_of(event)
 
 
-def preprocess(pipeline: Pipeline, scan: Scan) -> Scan:
-    """Return a scan of one frame after all steps of ``preprocess``, checked to be finite."""
-    for plugin in pipeline.preprocess:
-        before = scan.signals.shape
-        scan = plugin.process(scan)
-        if not isinstance(scan, Scan) or scan.signals.shape != before:
-            raise PluginError(f"preprocessor '{plugin.name}' returned no scan of shape {before}")
-    used = np.asarray(scan.signals)[scan.valid]
-    if not np.isfinite(used).all():
-        raise SolverError(f"frame: {(~np.isfinite(used)).sum()} samples of valid channels are not finite")
-    return scan
+def preprocess(pipeline: Pipeline, scan: Scan, frame: int, memo: Memo | None = None) -> Scan:
+    """Return one frame after all steps of ``preprocess``, checked to be finite and seen by the grid."""
+    memo = Memo() if memo is None else memo
+    one = partial(_preprocess, pipeline, scan, frame)
+    clean = memo.get(_raw_key(pipeline, scan, frame), one, lambda made: int(np.asarray(made.signals).nbytes))
+    clean.geometry.check_grid(pipeline.grid.grid())
+    return clean
 
 
 def problems(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iterator[tuple[float, Problem]]:
     """Yield wavelength (nm) and problem for each wavelength of a preprocessed frame."""
     key = (clean.geometry, grid, pipeline.forward)
-    operator = memo.get(key, lambda: pipeline.forward.operator(clean.geometry, grid), _operator_bytes)
-    expected = (clean.geometry.detectors.count * clean.geometry.n_samples, grid.shape[0] * grid.shape[1])
-    if tuple(operator.shape) != expected:
-        raise PluginError(
-            f"forward model '{pipeline.forward.name}': operator of shape {operator.shape}, not {expected}"
-        )
-    signals = np.asarray(clean.signals)[0]
-    for wavelength, record, valid in zip(clean.wavelengths_nm, signals, clean.valid[0], strict=True):
+    operator = memo.keep(key, partial(_operator, pipeline, clean, grid))
+    for wavelength, record, valid in zip(clean.wavelengths_nm, clean.signals[0], clean.valid[0], strict=True):
         rows = np.repeat(valid, clean.geometry.n_samples)
-        masked = memo.get((key, rows.tobytes()), partial(without_rows, operator, rows), _operator_bytes)
-        data = np.where(rows, record.ravel(), 0)
-        yield wavelength, Problem(masked, data, grid.shape, clean.geometry, grid)
+        used = operator
+        if not valid.all():
+            used = memo.get(
+                (key, valid.tobytes()), partial(without_rows, operator, rows), lambda made: made.rows.nbytes
+            )
+        data = np.where(rows, np.ravel(record), 0)
+        yield wavelength, Problem(used, data, grid.shape, clean.geometry, grid, valid)
 
 
-def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None) -> tuple[Pipeline, weights.Choice | None]:
+def resolve(
+    pipeline: Pipeline, scan: Scan, memo: Memo | None = None, on_event: Listener = ignore
+) -> tuple[Pipeline, weights.Choice | None]:
     """Return the pipeline with its weight chosen, and how it was chosen.
 
     The rule runs once, on the scan's first frame and its strongest wavelength (the one of the largest signals),
@@ -180,15 +167,21 @@ def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None) -> tuple[P
     if not isinstance(getattr(pipeline.reconstruct, "weight", None), str):
         return pipeline, None
     memo = Memo() if memo is None else memo
-    scan = pipeline.scan.apply(scan)
-    clean = preprocess(pipeline, scan.frame(0))
-    _, strongest = max(problems(pipeline, clean, pipeline.grid.grid(), memo), key=lambda pair: norm(pair[1].data))
-    solver, choice = weights.resolve(pipeline.reconstruct, strongest)
+    on_event(StepStarted("choosing the weight"))
+    clean = preprocess(pipeline, scan, 0, memo)
+    each = problems(pipeline, clean, pipeline.grid.grid(), memo)
+    _, strongest = max(each, key=lambda pair: norm(pair[1].data))
+    with blame(pipeline.reconstruct):
+        solver, choice = weights.resolve(pipeline.reconstruct, strongest)
     return pipeline.with_solver(solver), choice
 
 
-def describe_scan(scan: Scan) -> dict[str, Any]:
-    """Return what a result keeps of the scan that it was made from, as plain values."""
+def describe_scan(scan: Scan, pipeline: Pipeline) -> dict[str, Any]:
+    """Return what a result keeps of the scan that it was made from, as plain values.
+
+    The fingerprint is that of the scan as read; the speed of sound is the one that was used.
+    """
+    used = pipeline.scan.speed_of_sound_m_s
     return {
         "name": scan.name,
         "source": scan.source,
@@ -196,10 +189,47 @@ def describe_scan(scan: Scan) -> dict[str, Any]:
         "fingerprint": scan.fingerprint,
         "frames": scan.frames,
         "wavelengths_nm": list(scan.wavelengths_nm),
-        "speed_of_sound_m_s": scan.geometry.speed_of_sound_m_s,
-        "speed_of_sound_source": scan.speed_of_sound_source,
+        "speed_of_sound_m_s": scan.geometry.speed_of_sound_m_s if used is None else used,
+        "speed_of_sound_source": scan.speed_of_sound_source if used is None else "pipeline",
         "notes": list(scan.notes),
     }
+
+
+def history_of(pipeline: Pipeline) -> tuple[dict[str, Any], ...]:
+    """Return the steps up to the reconstruction as plain tables, each with the name of its slot."""
+    chain: list[tuple[str, Plugin]] = [("preprocess", p) for p in pipeline.preprocess]
+    chain += [("forward", pipeline.forward), ("reconstruct", pipeline.reconstruct)]
+    return tuple({"step": slot, **plugin.model_dump()} for slot, plugin in chain)
+
+
+def _raw_key(pipeline: Pipeline, scan: Scan, frame: int) -> tuple[Any, ...]:
+    return (scan.fingerprint, scan.notes, frame, pipeline.scan, pipeline.preprocess)
+
+
+def _preprocess(pipeline: Pipeline, scan: Scan, frame: int) -> Scan:
+    one = pipeline.scan.apply(scan.frame(frame))
+    for plugin in pipeline.preprocess:
+        before = one.signals.shape[:3]
+        with blame(plugin):
+            one = plugin.process(one)
+        if not isinstance(one, Scan) or one.signals.shape[:3] != before:
+            raise PluginError(
+                f"preprocessor '{plugin.name}' returned no scan of (frame, wavelength, detector) {before}"
+            )
+    used = np.asarray(one.signals)[one.valid]
+    if not np.isfinite(used).all():
+        raise SolverError(f"frame {frame}: {(~np.isfinite(used)).sum()} samples of valid channels are not finite")
+    return one
+
+
+def _operator(pipeline: Pipeline, clean: Scan, grid: Grid) -> Any:
+    with blame(pipeline.forward):
+        operator = pipeline.forward.operator(clean.geometry, grid)
+    expected = (clean.geometry.detectors.count * clean.geometry.n_samples, grid.shape[0] * grid.shape[1])
+    if tuple(operator.shape) != expected:
+        name = pipeline.forward.name
+        raise PluginError(f"forward model '{name}': operator of shape {tuple(operator.shape)}, not {expected}")
+    return operator
 
 
 def _memoised(memo: Memo, key: tuple[Any, ...], step: str, work: Iterator[Any]) -> Iterator[Event]:
@@ -224,39 +254,33 @@ def _reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Ite
     norms: list[float] = []
     for wavelength, problem in problems(pipeline, clean, grid, memo):
         state = None
-        for state in solver.iterate(problem):
-            yield StepIterate("reconstruct", wavelength, state)
+        with blame(solver):
+            for state in solver.iterate(problem):
+                yield StepIterate("reconstruct", wavelength, state)
         last.append(_checked_iterate(solver, state, problem))
         norms.append(norm(problem.data))
-    values = np.stack([state.image for state in last]).astype(np.float32)
-    image = Image(
-        values,
-        "initial_pressure",
-        "a.u.",
-        grid,
-        clean.wavelengths_nm,
-        history_of(pipeline),
-        _diagnose(values, last, norms),
-    )
-    yield {"initial_pressure": image}
-
-
-def history_of(pipeline: Pipeline) -> tuple[dict[str, Any], ...]:
-    """Return the steps up to the reconstruction as plain tables, each with the name of its slot."""
-    chain: list[tuple[str, Plugin]] = [("preprocess", p) for p in pipeline.preprocess]
-    chain += [("forward", pipeline.forward), ("reconstruct", pipeline.reconstruct)]
-    return tuple({"step": slot, **plugin.model_dump()} for slot, plugin in chain)
+    with np.errstate(over="ignore"):
+        values = np.stack([state.image for state in last]).astype(np.float32)
+    made = Image(values, "initial_pressure", "a.u.", grid, clean.wavelengths_nm, history_of(pipeline))
+    _check_finite(solver, "initial_pressure", made)
+    yield {"initial_pressure": replace(made, diagnostics=_diagnose(values, last, norms))}
 
 
 def _checked_iterate(solver: Solver, state: Iterate | None, problem: Problem) -> Iterate:
     if state is None:
         raise PluginError(f"solver '{solver.name}' ended without yielding an image")
-    image = np.asarray(state.image)
-    if image.shape != problem.shape:
-        raise PluginError(f"solver '{solver.name}' returned an image of shape {image.shape}, not {problem.shape}")
-    if not np.isfinite(image).all():
-        raise SolverError(f"solver '{solver.name}' returned {(~np.isfinite(image)).sum()} pixels that are not finite")
+    shape = np.shape(state.image)
+    if shape != problem.shape:
+        raise PluginError(f"solver '{solver.name}' returned an image of shape {shape}, not {problem.shape}")
     return state
+
+
+def _check_finite(plugin: Plugin, name: str, image: Image) -> None:
+    """Raise `SolverError` for infinite pixels, and for NaN where every pixel has a value: in the initial pressure."""
+    wrong = ~np.isfinite(image.values) if name == "initial_pressure" else np.isinf(image.values)
+    if wrong.any():
+        kind = plugin.kind.replace("_", " ")
+        raise SolverError(f"{kind} '{plugin.name}' returned {wrong.sum()} pixels of '{name}' that are not finite")
 
 
 def _diagnose(values: np.ndarray, last: list[Iterate], norms: list[float]) -> dict[str, Any]:
@@ -284,28 +308,20 @@ def _warnings(step: str, images: Mapping[str, Image]) -> tuple[str, ...]:
 def _single(name: str, plugin: Any, images: dict[str, Image]) -> Iterator[dict[str, Image]]:
     """Yield the images of a step that has no iterates."""
     pressure = images["initial_pressure"]
-    if name == "segment":
-        made = {"boundary": plugin.segment(pressure)}
-    else:
-        made = dict(plugin.unmix(UnmixProblem(pressure, boundary=images.get("boundary"))))
+    with blame(plugin):
+        if name == "segment":
+            made = {"boundary": plugin.segment(pressure)}
+        else:
+            made = dict(plugin.unmix(UnmixProblem(pressure, boundary=images.get("boundary"))))
     history = {"step": name, **plugin.model_dump()}
     for key, image in made.items():
         if not isinstance(image, Image) or image.grid != pressure.grid:
-            raise PluginError(
-                f"{plugin.kind.replace('_', ' ')} '{plugin.name}' returned no image on the grid as '{key}'"
-            )
+            kind = plugin.kind.replace("_", " ")
+            raise PluginError(f"{kind} '{plugin.name}' returned no image on the grid as '{key}'")
+        _check_finite(plugin, key, image)
         made[key] = replace(image, history=(*pressure.history, history))
     yield made
 
 
 def _images_of(event: Event) -> Mapping[str, Image]:
     return event.images if isinstance(event, StepDone) else {}
-
-
-def _scan_bytes(scan: Scan) -> int:
-    return int(np.asarray(scan.signals).nbytes)
-
-
-def _operator_bytes(operator: Any) -> int:
-    """Tell the memory that an operator says it holds; one without a matrix holds little and need not say."""
-    return int(getattr(operator, "nbytes", 0))

@@ -20,8 +20,10 @@ from oatkit.result import Result
 from oatkit.store import load
 
 
-def export(result: Result | str | Path, file: str | Path, frame: int = 0, overwrite: bool = False) -> None:
+def export(result: Result | str | Path, file: str | Path, frame: int | None = None, overwrite: bool = False) -> None:
     """Write frame `frame` of a result, or of the result folder at a path, in the format that the name asks for.
+
+    Without `frame`, the first one that has images.
 
     Raises `ValidationError` for a name whose ending is not among `FORMATS` or a frame that does not exist, and
     `ResultError` where the result is damaged, the file exists and `overwrite` is not asked for, or cannot be written.
@@ -34,7 +36,7 @@ def export(result: Result | str | Path, file: str | Path, frame: int = 0, overwr
         result = load(result)
     inputs = [str(result.scan.get("source", "")), *([str(result.stored.path)] if result.stored else [])]
     check_output(file, inputs, overwrite)
-    write_file(file, convert(result.frame(frame)), overwrite)
+    write_file(file, convert(result if frame is None else result.frame(frame)), overwrite)
 
 
 def _png(result: Result) -> bytes:

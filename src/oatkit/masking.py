@@ -12,7 +12,7 @@ class MaskedOperator:
         self.operator = operator
         self.rows = rows
         self.shape = operator.shape
-        self.dtype = operator.dtype
+        self.dtype = getattr(operator, "dtype", np.dtype(float))
 
     def matvec(self, image: np.ndarray) -> np.ndarray:
         """Return the predicted data of the rows that count, zero in the others."""

@@ -17,6 +17,7 @@ class Memo:
     def __init__(self, limit_bytes: int = 256_000_000) -> None:
         self.limit_bytes = limit_bytes
         self._values: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._newest: tuple[Hashable, Any] | None = None
         self._lock = Lock()
 
     def get(self, key: Hashable, compute: Callable[[], T], size: Callable[[T], int]) -> T:
@@ -26,6 +27,12 @@ class Memo:
             found = compute()
             self.put(key, found, size(found))
         return found
+
+    def keep(self, key: Hashable, compute: Callable[[], T]) -> T:
+        """Return the value of `key`; of these only the newest is held, whatever its size: an acoustic operator."""
+        if self._newest is None or self._newest[0] != key:
+            self._newest = (key, compute())
+        return self._newest[1]
 
     def peek(self, key: Hashable) -> Any:
         """Return the value of `key`, or None."""

@@ -20,7 +20,7 @@ try:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.ticker import ScalarFormatter
-except ModuleNotFoundError as error:
+except ImportError as error:
     raise ResultError('a figure needs matplotlib, which is not installed: pip install "oatkit[report]"') from error
 
 # A power of two, so that sizes in dots survive the way through inches exactly.

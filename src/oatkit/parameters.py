@@ -5,7 +5,7 @@ come validation, the keys of a pipeline file, ``oatkit describe``, ``--set``, th
 """
 
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, get_args, get_origin
@@ -142,6 +142,8 @@ class Parameters(BaseModel, metaclass=_OurErrors):
 
     kind: ClassVar[str] = ""
     name: ClassVar[str] = ""
+    written_as: ClassVar[str] = ""
+    """``distribution:name``, where the name alone would stand for another plugin, too; the registry sets it."""
     key_word: ClassVar[str] = "parameter"
     """What a message calls a key of this table."""
     title: ClassVar[str] = "this table"
@@ -166,29 +168,43 @@ class Parameters(BaseModel, metaclass=_OurErrors):
     def _check(cls, value: Any, handler: Any, info: ValidationInfo) -> Any:
         field = cls.model_fields[info.field_name or ""]
         context: Context | None = info.context
-        if isinstance(value, list):
-            value = tuple(value)
+        value = _as_tuples(value)
         if (ability := part_of(field)) and isinstance(value, Mapping):
             value = _part(ability, field.default, value, context)
         elif ability and isinstance(value, tuple):
             value = _parts(ability, value, context)
-        elif field.annotation is Path and isinstance(value, str):
+        elif Path in (field.annotation, *get_args(field.annotation)) and isinstance(value, str):
             value = (context.folder if context else Path()) / value
         try:
             checked = handler(value)
         except pydantic.ValidationError:
             raise _not_what_was_expected(field, value) from None
-        numbers = checked if isinstance(checked, tuple) else (checked,)
-        bounds = bounds_of(field)
-        if not all(bounds.allow(n) for n in numbers if isinstance(n, int | float)):
+        # To Python, true equals 1 and so does 1.0.
+        wrong_type = get_origin(field.annotation) is Literal and type(value) not in map(
+            type, get_args(field.annotation)
+        )
+        if wrong_type or not all(bounds_of(field).allow(number) for number in _numbers(checked)):
             raise _not_what_was_expected(field, value)
         return checked
 
     @model_serializer
     def _table(self) -> dict[str, Any]:
         """Return the parameters as a table of a pipeline file, with the plugin's name under ``use``."""
-        head = {"use": self.name} if self.name else {}
+        head = {"use": self.written_as or self.name} if self.name else {}
         return head | {name: _plain(getattr(self, name)) for name in type(self).model_fields}
+
+
+def _as_tuples(value: Any) -> Any:
+    return tuple(_as_tuples(item) for item in value) if isinstance(value, list | tuple) else value
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """Yield the numbers in a value, nested tuples included."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _numbers(item)
+    elif isinstance(value, int | float):
+        yield value
 
 
 def _plain(value: Any) -> Any:
@@ -196,12 +212,13 @@ def _plain(value: Any) -> Any:
         return value.model_dump()
     if isinstance(value, tuple):
         return [_plain(v) for v in value]
-    return str(value) if isinstance(value, Path) else value
+    # Absolute, since the file that it is written to may lie elsewhere.
+    return str(value.absolute()) if isinstance(value, Path) else value
 
 
 def _part(ability: type[Parameters], default: Any, table: Mapping[str, Any], context: Context | None) -> Parameters:
     """Make the plugin that a nested table describes; without ``use`` it is the field's own."""
-    parameters = {k: v for k, v in table.items() if k != "use"}
+    parameters = {k: v for k, v in table.items() if k != "use" or not ability.kind}
     chosen = ability if not ability.kind else _used(ability, default, table.get("use"), context)
     if isinstance(default, chosen):
         parameters = {**default.model_dump(), **parameters}
@@ -241,6 +258,8 @@ def _parts(ability: type[Parameters], tables: tuple[Any, ...], context: Context 
 
 def _not_what_was_expected(field: FieldInfo, value: Any) -> PydanticCustomError:
     got = f"the {value.kind} '{value.name}'" if isinstance(value, Parameters) else _shown(value)
+    if isinstance(value, str) and (ability := part_of(field)) and ability.kind:
+        got += f'; write {{ use = "{value}" }}'
     return PydanticCustomError("oatkit", "must be {expected}, got {got}", {"expected": expected(field), "got": got})
 
 

@@ -77,15 +77,20 @@ class Pipeline(Parameters):
         """Read a pipeline from TOML text; `origin` names it in messages, paths in it are relative to `folder`."""
         try:
             table = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
+        except (ValueError, RecursionError) as error:  # beyond syntax: numbers too long, nesting too deep
             raise ValidationError(f"{origin}: not valid TOML: {error}") from None
         for change in changes:
             set_value(table, change)
         try:
-            return cls.model_validate(table, context=Context(installed().find, folder))
+            pipeline = cls.model_validate(table, context=Context(installed().find, folder))
         except pydantic.ValidationError as error:
             lines = [f"{origin}{_where(path, table)}: {text}" for path, text in problems(error)]
             raise ValidationError("\n".join(lines)) from None
+        try:
+            pipeline.grid.grid()
+        except ValidationError as error:
+            raise ValidationError(f"{origin} [grid]: {error}") from None
+        return pipeline
 
     def to_toml(self) -> str:
         """Return the pipeline as TOML text with every parameter; `loads` gives back an equal pipeline."""
@@ -129,6 +134,10 @@ def set_value(table: dict[str, Any], change: str) -> None:
         raise ValidationError(f"--set {change}: expected slot.key=value, as in reconstruct.weight=0.01")
     for key in keys[:-1]:
         table = _descend(table, key, change)
+    if not isinstance(table, dict):
+        raise ValidationError(
+            f"--set {change}: '{keys[-2]}' is a list of steps; say which, as in preprocess.offset.KEY=VALUE"
+        )
     if keys[-1] == "use":
         table.clear()
     table[keys[-1]] = _value(text.strip())
@@ -136,15 +145,12 @@ def set_value(table: dict[str, Any], change: str) -> None:
 
 def _descend(table: Any, key: str, change: str) -> Any:
     if isinstance(table, list):
-        steps = {step.get("use"): step for step in table if isinstance(step, dict)}
+        steps = {str(step.get("use")): step for step in table if isinstance(step, dict)}
         if key not in steps:
-            hint = did_you_mean(key, (str(name) for name in steps))
+            hint = did_you_mean(key, steps)
             raise ValidationError(f"--set {change}: the pipeline has no step '{key}' there{hint}")
         return steps[key]
     below = table.setdefault(key, {})
-    if isinstance(below, str):
-        # A plugin named by its bare word becomes a table that can take keys.
-        below = table[key] = {"use": below}
     if not isinstance(below, dict | list):
         raise ValidationError(f"--set {change}: '{key}' is a value, not a table")
     return below
@@ -152,9 +158,12 @@ def _descend(table: Any, key: str, change: str) -> Any:
 
 def _value(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        table = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text
+    except (ValueError, RecursionError):
+        raise ValidationError(f"--set: {text[:40]}... is too long a number or nested too deeply") from None
+    return table["value"] if len(table) == 1 else text
 
 
 def _source(name_or_path: str) -> tuple[str, str, Path]:
@@ -163,10 +172,11 @@ def _source(name_or_path: str) -> tuple[str, str, Path]:
     if path.suffix != ".toml":
         return preset(name_or_path), name_or_path, Path()
     try:
-        return path.read_text(encoding="utf-8"), path.name, path.parent
-    except FileNotFoundError:
-        raise ValidationError(f"{path}: no such pipeline file") from None
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+        if not path.is_file():
+            raise ValidationError(f"{path}: no such pipeline file")
+        # Some editors put a mark before the text that names its encoding.
+        return path.read_text(encoding="utf-8-sig"), path.name, path.parent
+    except (OSError, UnicodeDecodeError) as error:
         raise ValidationError(f"{path}: not a readable text file: {error}") from None
 
 

@@ -1,36 +1,30 @@
-"""What a solver gets and what it yields, and the scale that makes weights and priors dimensionless."""
+"""What a solver gets and what it yields."""
 
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeVar
-from weakref import WeakKeyDictionary
+from typing import Any
 
 import numpy as np
 
-from oatkit.data import Geometry, Grid, Image, read_only
+from oatkit.checked import as_data, as_operator, as_product, as_shape, as_valid
+from oatkit.data import Geometry, Grid, Image
 from oatkit.errors import SolverError, ValidationError
-from oatkit.vectors import inner, norm
+from oatkit.scale import Reference, recall_norm, reference, remember_norm, returned, spectral_norm
 
-_norms: WeakKeyDictionary[Any, tuple[float, int]] = WeakKeyDictionary()
-"""Spectral norm of each operator in use, and the applications of A^T A that it took."""
-
-
-AT_LEAST = 20
-"""Steps of `spectral_norm` before it trusts its value."""
-
-Result = TypeVar("Result")
+LARGEST_WEIGHT = 1e300
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Find an image x of ``shape`` with ``operator @ x.ravel()`` near ``data``.
 
-    Raises `ValidationError` where the sizes do not fit together or the data are not finite.
+    Raises `ValidationError` where the sizes do not fit together, or the data are none, not finite or not real.
     """
 
     operator: Any
-    """Anything that scipy's ``aslinearoperator`` takes: a matrix, a sparse matrix, a ``LinearOperator``."""
+    """Anything with ``shape``, ``matvec`` and ``rmatvec``, or that scipy's ``aslinearoperator`` takes: a matrix, a
+    sparse matrix, a ``LinearOperator``."""
     data: np.ndarray
     """The measured signals, raveled."""
     shape: tuple[int, int]
@@ -39,33 +33,41 @@ class Problem:
     """Where the data come from; only for solvers that are no inversion of an operator (back-projection)."""
     grid: Grid | None = None
     """Where the image lies; likewise."""
+    valid: np.ndarray | None = None
+    """Which detectors count, bool, shape ``(detector,)``; None where all do. In the rows of the others operator and
+    data are zero: an inversion need not look at it, a sum over detectors must."""
 
     def __post_init__(self) -> None:
-        operator = self.operator
-        if not (hasattr(operator, "matvec") and hasattr(operator, "rmatvec")):
-            from scipy.sparse.linalg import aslinearoperator  # slow to import: only for bare matrices
-
-            operator = aslinearoperator(operator)
-        data = read_only(np.asarray(self.data, dtype=float).ravel())
-        rows, columns = operator.shape
-        if rows != data.size or columns != self.shape[0] * self.shape[1]:
+        checked = {
+            "operator": as_operator(self.operator),
+            "data": as_data(self.data),
+            "shape": as_shape(self.shape),
+            "valid": as_valid(self.valid, self.geometry),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        rows, columns = self.operator.shape
+        if rows != self.data.size or columns != self.shape[0] * self.shape[1]:
             raise ValidationError(
-                f"problem: an operator of shape {(rows, columns)} does not map an image of shape {tuple(self.shape)} "
-                f"to {data.size} data"
+                f"problem: an operator of shape {(rows, columns)} does not map an image of shape {self.shape} "
+                f"to {self.data.size} data"
             )
-        if not np.isfinite(data).all():
-            raise ValidationError(f"problem: {(~np.isfinite(data)).sum()} of {data.size} data are not finite")
-        object.__setattr__(self, "operator", operator)
-        object.__setattr__(self, "data", data)
-        object.__setattr__(self, "shape", (int(self.shape[0]), int(self.shape[1])))
+        if self.geometry and self.geometry.shape[0] * self.geometry.shape[1] != rows:
+            raise ValidationError(f"problem: a geometry of shape {self.geometry.shape} does not fit {rows} data")
+        if self.grid and self.grid.shape != self.shape:
+            raise ValidationError(f"problem: a grid of shape {self.grid.shape} does not fit an image of {self.shape}")
 
     def forward(self, image: np.ndarray) -> np.ndarray:
         """Return A x as float64, raveled. Raises `SolverError` where it is not finite."""
-        return _finite(self.operator.matvec(np.ravel(image))).ravel()
+        return as_product(self.operator.matvec(np.ravel(image)), self.data.size).ravel()
 
     def adjoint(self, data: np.ndarray) -> np.ndarray:
         """Return A^T y as float64, of the shape of the image. Raises `SolverError` where it is not finite."""
-        return _finite(self.operator.rmatvec(np.ravel(data))).reshape(self.shape)
+        try:
+            product = self.operator.rmatvec(np.ravel(data))
+        except NotImplementedError:
+            raise SolverError("operator: it has no adjoint; expected a method rmatvec beside matvec") from None
+        return as_product(product, self.shape[0] * self.shape[1]).reshape(self.shape)
 
     @cached_property
     def back_projected(self) -> np.ndarray:
@@ -74,13 +76,23 @@ class Problem:
 
     @property
     def norm(self) -> float:
-        """The spectral norm |A|, computed once for each operator object; see `spectral_norm`."""
-        return self._settled_norm[0]
+        """The spectral norm |A|, computed once for each operator object; see `oatkit.scale.spectral_norm`."""
+        return returned(self.settle_norm())[0]
 
-    @cached_property
-    def reference(self) -> "Reference":
+    @property
+    def norm_products(self) -> int:
+        """Applications of A^T A that `norm` took, in this problem or in the one that found it first."""
+        return returned(self.settle_norm())[1]
+
+    @property
+    def reference(self) -> Reference:
         """The scale of the image, from a short least-squares solution; see `Reference`."""
-        return _last(reference(self))
+        return returned(self._settle_reference())
+
+    @property
+    def settling_products(self) -> int:
+        """Applications of A^T A that `norm` and `reference` took, likewise."""
+        return self.norm_products + self.reference.products
 
     def settle(self) -> Iterator[None]:
         """Determine `norm` and `reference`, yielding after each application of A^T A.
@@ -88,13 +100,25 @@ class Problem:
         A solver yields an iterate at each, so that it can be cancelled while the scale is being set.
         """
         yield from self.settle_norm()
-        if "reference" not in self.__dict__:
-            self.__dict__["reference"] = yield from reference(self)
+        yield from self._settle_reference()
 
-    @property
-    def settling_products(self) -> int:
-        """Applications of A^T A that `norm` and `reference` took, or would have taken without what was known before."""
-        return self._settled_norm[1] + self.reference.products
+    def settle_norm(self) -> Generator[None, None, tuple[float, int]]:
+        """Determine `norm`, yielding after each application of A^T A; for solvers that need no `reference`."""
+        if "_norm" not in self.__dict__:
+            found = recall_norm(self.operator)
+            if found is None:
+                found = yield from spectral_norm(self.forward, self.adjoint, self.operator.shape)
+                remember_norm(self.operator, found)
+            self.__dict__["_norm"] = found
+        return self.__dict__["_norm"]
+
+    def _settle_reference(self) -> Generator[None, None, Reference]:
+        if "_reference" not in self.__dict__:
+            found = yield from reference(
+                lambda image: self.adjoint(self.forward(image)), self.back_projected, self.norm
+            )
+            self.__dict__["_reference"] = found
+        return self.__dict__["_reference"]
 
     def applied_weight(self, weight: float | str, scaling: str, degree: int) -> float:
         """Return w of the formula for a solver's field ``weight``, read as its field ``scaling`` says.
@@ -107,26 +131,17 @@ class Problem:
                 f"weight: the rule '{weight}' has not been applied yet; oatkit.run applies it, and so does "
                 "oatkit.weights.resolve(solver, problem)"
             )
-        if scaling == "absolute":
-            return weight
-        # A quadratic penalty needs no x_ref, which takes products to find.
-        unit = self.norm**2 * (1.0 if degree == 2 else self.reference.level ** (2 - degree))
-        if unit > 0 and not 1e-300 <= weight * unit <= 1e300:
+        unit = 1.0 if scaling == "absolute" else self._unit_of_weight(degree)
+        if unit > 0 and not 1 / LARGEST_WEIGHT <= weight * unit <= LARGEST_WEIGHT:
             raise ValidationError(
-                f"weight: {weight:g} times |A|^2 x_ref^{2 - degree} = {unit:g} leaves the range of floats; "
-                "scale the data to order 1 or take another weight"
+                f"weight: {weight:g} in units of {unit:g} leaves the range of {1 / LARGEST_WEIGHT:g} to "
+                f"{LARGEST_WEIGHT:g}; scale the data to order 1 or take another weight"
             )
         return weight * unit
 
-    @property
-    def _settled_norm(self) -> tuple[float, int]:
-        return _last(self.settle_norm())
-
-    def settle_norm(self) -> Generator[None, None, tuple[float, int]]:
-        """Determine `norm`, yielding after each application of A^T A; for solvers that need no `reference`."""
-        if self.operator not in _norms:
-            _norms[self.operator] = yield from spectral_norm(self)
-        return _norms[self.operator]
+    def _unit_of_weight(self, degree: int) -> float:
+        # A quadratic penalty needs no x_ref, which takes products to find.
+        return self.norm**2 * (1.0 if degree == 2 else self.reference.level ** (2 - degree))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,25 +162,14 @@ class Iterate:
     """Certificate: an upper bound on (objective - optimum) / objective; NaN where the method has none, inf where it
     failed."""
     products: int = 0
-    """Applications of A^T A (or of A and A^T, counted together) so far, the setting of the scale included."""
+    """Applications of A^T A (or of A and A^T, counted together) so far, to one, the setting of the scale included
+    where the method needs it."""
     converged: bool = False
     """Whether the promise of the method is kept: set on the last iterate only."""
     reason: str = ""
     """Why it stopped, as advice to the user: set on the last iterate only."""
     details: Mapping[str, Any] = field(default_factory=dict)
     """Further numbers worth keeping with the image: the weight as applied, pixels set to zero, ..."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """The scale of an image: x_ref, and the image that it was read off."""
-
-    level: float
-    """x_ref: the 99th percentile of `base` (of its absolute values where that is not positive); 0 for zero data."""
-    base: np.ndarray
-    """20 steps of conjugate gradients on least squares with the Laplacian at weight 1e-2 |A|^2, from zero."""
-    products: int = 0
-    """Applications of A^T A that it took."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,94 +180,3 @@ class UnmixProblem:
     absorption: Image | None = None
     boundary: Image | None = None
     fluence_model: Any = None
-
-
-def spectral_norm(
-    problem: Problem, steps: int = 40, tolerance: float = 1e-2
-) -> Generator[None, None, tuple[float, int]]:
-    """Return |A|, the largest singular value, and the steps taken, yielding after each.
-
-    By Golub-Kahan-Lanczos bidiagonalisation from a seeded start. It sees the same Krylov space as the power iteration
-    and reads more off it: exact after n steps for an image of n pixels, and here stopped where the triplet of the
-    largest value fits by `tolerance`, |A^T u - s v| <= tolerance * s, but not before `AT_LEAST` steps: a second value
-    close to the largest fits sooner. A bound from below, and within 1e-3 on all matrices tried. 0 for a zero operator.
-    """
-    steps = min(steps, *problem.operator.shape)
-    v = np.random.default_rng(0).standard_normal(problem.shape).ravel()
-    right = [v / norm(v)]
-    alphas: list[float] = []
-    betas: list[float] = []
-    value, u = 0.0, np.zeros(problem.data.shape)
-    for _ in range(steps):
-        u = problem.forward(right[-1]) - (betas[-1] if betas else 0.0) * u
-        alphas.append(norm(u))
-        left, values, _ = np.linalg.svd(np.diag(alphas) + np.diag(betas, 1))
-        value = float(values[0])
-        if alphas[-1] <= 1e-14 * value:
-            break
-        u = u / alphas[-1]
-        v = problem.adjoint(u).ravel()
-        yield
-        basis = np.array(right)
-        v = v - np.einsum("i,ij->j", np.einsum("ij,j->i", basis, v), basis)  # rounding would let old directions back in
-        betas.append(norm(v))
-        fits = betas[-1] * abs(left[-1, 0]) <= tolerance * value
-        if betas[-1] <= 1e-14 * value or (fits and len(alphas) >= AT_LEAST):
-            break
-        right.append(v / betas[-1])
-    return value, len(alphas)
-
-
-def reference(problem: Problem, steps: int = 20) -> Generator[None, None, Reference]:
-    """Return the scale of the problem's image, yielding after each step; see `Reference` for the rule."""
-    weight = 1e-2 * problem.norm**2
-    image = np.zeros(problem.shape)
-    residual = problem.back_projected
-    direction, energy = residual, inner(residual, residual)
-    products = 0
-    while products < steps and energy > 0:
-        curved = problem.adjoint(problem.forward(direction)) + weight * laplacian(laplacian(direction))
-        products += 1
-        yield
-        curvature = inner(direction, curved)
-        if curvature <= 0:
-            break
-        step = energy / curvature
-        image = image + step * direction
-        residual = residual - step * curved
-        previous, energy = energy, inner(residual, residual)
-        direction = residual + (energy / previous) * direction
-    level = float(np.percentile(image, 99))
-    if not level > 0:
-        level = float(np.percentile(abs(image), 99))
-    return Reference(level, read_only(image), products)
-
-
-def _finite(product: np.ndarray) -> np.ndarray:
-    product = np.asarray(product, dtype=float)
-    if not np.isfinite(product).all():
-        raise SolverError(
-            f"operator: {(~np.isfinite(product)).sum()} of {product.size} values of its product are not finite; "
-            "the operator is faulty, or the image grew beyond the range of its numbers"
-        )
-    return product
-
-
-def laplacian(image: np.ndarray) -> np.ndarray:
-    """Apply the 5-point Laplacian in pixel units with Neumann edges; it is symmetric, so it is its own adjoint."""
-    out = np.zeros_like(image, dtype=float)
-    down, across = np.diff(image, axis=0), np.diff(image, axis=1)
-    out[:-1] += down
-    out[1:] -= down
-    out[:, :-1] += across
-    out[:, 1:] -= across
-    return out
-
-
-def _last(steps: Generator[None, None, Result]) -> Result:
-    """Run a generator to its end and return what it returns."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value

@@ -12,7 +12,9 @@ class ProgressBar:
     def __init__(self, frames: int = 1) -> None:
         from tqdm import tqdm  # only for a terminal
 
-        self.bar = tqdm(total=frames, unit="frame", disable=not sys.stderr.isatty(), file=sys.stderr, leave=False)
+        self.bar = tqdm(
+            total=frames, unit="frame", disable=not (sys.stderr and sys.stderr.isatty()), file=sys.stderr, leave=False
+        )
 
     def __enter__(self) -> "ProgressBar":
         return self

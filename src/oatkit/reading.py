@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from oatkit.api import Reader
+from oatkit.blame import blame
 from oatkit.data import Scan
 from oatkit.errors import ReadError
 from oatkit.registry import installed
@@ -17,18 +18,26 @@ def read(path: str | Path, reader: Reader | None = None) -> Scan:
     path = Path(path)
     if not _exists(path):
         raise ReadError(f"{path}: no such file or folder")
-    return (reader or _reader_of(path)).read(path)
+    with blame(reader := reader or _reader_of(path)):
+        return reader.read(path)
 
 
 def _reader_of(path: Path) -> Reader:
     readers = [make() for make in installed().of_kind("reader")]
-    claiming = [r for r in readers if isinstance(r, Reader) and r.can_read(path)]
-    names = [r.name for r in claiming]
+    claiming, failed = [], []
+    for reader in readers:
+        assert isinstance(reader, Reader)
+        try:
+            if reader.can_read(path):
+                claiming.append(reader)
+        except Exception as error:  # somebody's reader must not keep the others from reading
+            failed.append(f"; reader '{reader.name}' failed: {type(error).__name__}: {error}")
     if len(claiming) > 1:
-        raise ReadError(f"{path}: the readers {' and '.join(names)} both claim this file; hand one of them to read()")
+        names = " and ".join(reader.name for reader in claiming)
+        raise ReadError(f"{path}: the readers {names} both claim this file; hand one of them to read()")
     if not claiming:
-        known = ", ".join(r.name for r in readers)
-        raise ReadError(f"{path}: no installed reader knows this file (readers: {known})")
+        known = ", ".join(reader.name for reader in readers)
+        raise ReadError(f"{path}: no installed reader knows this file (readers: {known}){''.join(failed)}")
     return claiming[0]
 
 

@@ -126,6 +126,10 @@ def _entry(kind: str, cls: Any, whole: Entry) -> Entry:
     if inspect.isabstract(cls):
         missing = ", ".join(sorted(cls.__abstractmethods__))
         return replace(entry, problem=f"{cls.__name__} lacks the method {missing}")
+    try:
+        cls()
+    except (Exception, SystemExit) as error:
+        return replace(entry, problem=f"{cls.__name__}() with its defaults: {_reason(error)}")
     return replace(entry, status="ok", cls=cls)
 
 
@@ -137,6 +141,8 @@ def _mark_ambiguous(entries: list[Entry]) -> list[Entry]:
         if entry.cls and twins and entry.distribution != OURS:
             others = " and ".join(sorted({e.full_name for e in [entry, *twins]}))
             entry = replace(entry, status="ambiguous", problem=f"the name stands for {others}; write one of these")
+            assert entry.cls
+            entry.cls.written_as = entry.full_name
         marked.append(entry)
     return marked
 

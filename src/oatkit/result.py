@@ -38,8 +38,8 @@ class Frames(Protocol):
 class Result(Mapping[str, Image]):
     """The images of one frame by name, with their provenance: ``result["initial_pressure"]``.
 
-    One that was loaded shows its first frame, read when asked for, and knows the others. Equal results have equal
-    images; provenance (which holds timings) is not compared.
+    One that was loaded shows the first of its frames that did not fail, read when asked for, and knows the others.
+    Equal results have equal images; provenance (which holds timings) is not compared.
     """
 
     images: Mapping[str, Image]
@@ -108,6 +108,7 @@ class Result(Mapping[str, Image]):
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write all frames to a result folder; see `oatkit.store`. Raises `ResultError`."""
+        # The one import upwards: a result is below the store that writes it, and `result.save` is what users call.
         from oatkit.store import save
 
         save(self, path, overwrite)

@@ -17,17 +17,15 @@ fletcher32 checksum, uncompressed, little-endian::
 """
 
 import json
-import os
-import secrets
 from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from oatkit.atomic import check_output, check_space, sync
+from oatkit.atomic import check_output, check_space, new_file
 from oatkit.data import Grid, Image, Scan
-from oatkit.errors import ReadError, ResultError, ValidationError
+from oatkit.errors import ReadError, ValidationError
 from oatkit.hostile import MAX_CHUNK_BYTES, hdf5_dataset, open_hdf5
 
 MARKER = b"oatkit scan "
@@ -46,19 +44,11 @@ def write_scan(scan: Scan, path: Path | str, truth: Image | None = None, overwri
     The file stands under its name only when it is complete. Raises `ResultError` where it cannot be written, or exists
     and `overwrite` is not asked for.
     """
-    path = Path(path).absolute()
+    path = Path(path)
     check_output(path, [scan.source], overwrite)
     check_space(path, _size(scan, truth))  # HDF5 crashes the interpreter on a full disk
-    hidden = path.with_name(f".{path.name}.partial-{os.getpid()}-{secrets.token_hex(3)}")
-    try:
+    with new_file(path, overwrite) as hidden:
         _write(hidden, scan, truth)
-        sync(hidden)
-        os.replace(hidden, path)
-        sync(path.parent)
-    except OSError as error:
-        raise ResultError(f"{path}: the scan could not be written: {error.strerror or error}") from error
-    finally:
-        hidden.unlink(missing_ok=True)
 
 
 def read_truth(path: Path | str) -> Image | None:

@@ -50,8 +50,9 @@ class Store:
         return self._result({name: self.image(index, name) for name in self.manifest.images}, record)
 
     def first(self) -> Result:
-        """Return the result as a whole, showing its first frame; nothing is read yet."""
-        return self._result(StoredImages(self), self.manifest.records.get("0"), self)
+        """Return the result as a whole, showing the first frame that has images; nothing is read yet."""
+        index = min(map(int, self.manifest.records), default=0)
+        return self._result(StoredImages(self, index), self.manifest.records.get(str(index)), self)
 
     def record(self, index: int) -> FrameEntry:
         """Return the provenance of frame `index`; raises as `read` does."""
@@ -109,14 +110,15 @@ class Store:
 
 @dataclass(frozen=True, eq=False)
 class StoredImages(Mapping[str, Image]):
-    """The images of the first frame of a folder, each read when it is asked for and then kept."""
+    """The images of one frame of a folder, each read when it is asked for and then kept."""
 
     store: Store
+    index: int
     known: dict[str, Image] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Image:
         if name not in self.known:
-            self.known[name] = self.store.image(0, name)
+            self.known[name] = self.store.image(self.index, name)
         return self.known[name]
 
     def __contains__(self, name: object) -> bool:

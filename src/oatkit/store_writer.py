@@ -61,7 +61,7 @@ class StoreWriter:
     def __enter__(self) -> Self:
         check_output(self.path, [self._source], self._overwrite)
         if os.path.lexists(self.path) and not _looks_like_a_result(self.path):
-            raise ResultError(f"{self.path} is no oatkit result, so it is not overwritten; choose another name")
+            raise ResultError(f"{self.path}: is no oatkit result, so it is not overwritten; choose another name")
         self._folder = self._stack.enter_context(new_folder(self.path, self._overwrite))
         return self
 

@@ -97,6 +97,8 @@ def choose(solver: Solver, problem: Problem, rule: str, candidates: Sequence[flo
     if rule not in get_args(Rule):
         raise ValidationError(f"weight: no rule named '{rule}'; expected {' or '.join(get_args(Rule))}")
     weights = _checked(solver, candidates)
+    if not problem.data.any():
+        raise ValidationError("weight: the data are zero, so that no rule can choose; take a number")
     fit, rows = (problem, None) if rule == "l-curve" else _keep_back(problem)
     curve = tuple(sweep(solver, fit, weights, problem, rows))
     picks = _picks(curve)
@@ -142,22 +144,6 @@ def l_curve_chord(weights: Sequence[float], residual_norms: Sequence[float], pen
     return int(np.argmax(below))
 
 
-def gcv(singular_values: np.ndarray, coefficients: np.ndarray, outside: float, rows: int, weights: Any) -> np.ndarray:
-    r"""Return the generalised cross-validation function of Tikhonov's problem at each weight [Golub1979]_.
-
-    .. math:: G(w) = \frac{|A x_w - b|^2}{(n - \sum_i f_i)^2}, \qquad f_i = \frac{s_i^2}{s_i^2 + w}
-
-    for |A x - b|^2 + w |x|^2 with A = U diag(s) V^T of n `rows`: `coefficients` are U^T b, `outside` is the squared
-    norm of the part of b that U does not reach. Needs the singular values, so it is for small problems only.
-    """
-    weights = np.asarray(weights, dtype=float)
-    kept = singular_values**2 / (singular_values**2 + weights[..., None])
-    # 1 - f written without the difference: for weak weights it is all that is left.
-    lost = weights[..., None] / (singular_values**2 + weights[..., None])
-    residual = ((lost * coefficients) ** 2).sum(-1) + outside
-    return residual / (rows - kept.shape[-1] + lost.sum(-1)) ** 2
-
-
 def _l_curve(weights: Sequence[float], residual_norms: Sequence[float], penalties: Sequence[float]) -> np.ndarray:
     """Return log residual and half the log penalty, the bend towards the origin a left turn whatever the order."""
     w, residual, penalty = (np.asarray(values, dtype=float) for values in (weights, residual_norms, penalties))
@@ -196,7 +182,12 @@ def _keep_back(problem: Problem) -> tuple[Problem, np.ndarray]:
         )
     detectors = np.arange(count) % HELD_OUT == HELD_OUT // 2
     rows = np.repeat(detectors, problem.geometry.n_samples)
-    fit = replace(problem, operator=without_rows(problem.operator, ~rows), data=np.where(rows, 0, problem.data))
+    fit = replace(
+        problem,
+        operator=without_rows(problem.operator, ~rows),
+        data=np.where(rows, 0, problem.data),
+        valid=~detectors if problem.valid is None else problem.valid & ~detectors,
+    )
     return fit, rows
 
 

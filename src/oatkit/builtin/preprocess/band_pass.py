@@ -17,7 +17,9 @@ class BandPass(Preprocessor):
     .. math:: G(f) = \frac{1}{1 + (f/f_{high})^{2n}} \cdot \frac{(f/f_{low})^{2n}}{1 + (f/f_{low})^{2n}}
 
     The phase is zero, and G is 1/2 at either edge. The same response is convolved into the geometry's impulse response,
-    so that the forward model predicts filtered signals. Records count as zero outside, in the data as in the model.
+    so that the forward model predicts filtered signals. The data count as zero outside of the record, the model's
+    signals do not: where the field of view reaches beyond an end of it (or into what the step `transient` cut off),
+    data and model differ next to that end, for a time of the order of 1 / low.
     """
 
     name: ClassVar[str] = "band-pass"

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from oatkit.api import Preprocessor, Scan, ValidationError, param
+from oatkit.api import Preprocessor, ReadError, Scan, param
 from oatkit.builtin.preprocess.samples import window
 
 
@@ -26,7 +26,7 @@ class Channels(Preprocessor):
     saturated: float = param(0.001, "saturated: more than this share of samples at a limit", at_least=0, below=1)
 
     def process(self, scan: Scan) -> Scan:
-        """Return the scan with its bad channels at zero and marked. Raises `ValidationError` where none is left."""
+        """Return the scan with its bad channels at zero and marked. Raises `ReadError` where none is left."""
         signals = np.array(scan.signals)
         judged = signals[0, ..., window(scan.geometry, self.after, float("inf"), self.name)]
         valid = scan.valid.copy()
@@ -40,7 +40,7 @@ class Channels(Preprocessor):
             if found:
                 notes.append(f"channels: not used at {wavelength:g} nm: {_listed(found)}.")
             if not valid[0, i].any():
-                raise ValidationError(f"channels: no channel is left at {wavelength:g} nm ({_listed(found)})")
+                raise ReadError(f"channels: no channel is left at {wavelength:g} nm ({_listed(found)})")
         signals[~valid] = 0
         return replace(scan, signals=signals, valid=valid, notes=tuple(notes))
 

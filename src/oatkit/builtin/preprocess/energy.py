@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import ClassVar
 
-from oatkit.api import Preprocessor, Scan, ValidationError
+from oatkit.api import Preprocessor, ReadError, Scan
 from oatkit.builtin.preprocess.samples import check_offset_removed, finite_samples
 
 
@@ -25,9 +25,7 @@ class Energy(Preprocessor):
         energies = scan.pulse_energy[0]
         for wavelength, energy in zip(scan.wavelengths_nm, energies, strict=True):
             if not 0 < energy < float("inf"):
-                raise ValidationError(
-                    f"energy: expected a positive pulse energy at {wavelength:g} nm, found {energy:g}"
-                )
+                raise ReadError(f"energy: expected a positive pulse energy at {wavelength:g} nm, found {energy:g}")
         divided = (samples / energies[:, None, None]).astype(samples.dtype)
         note = f"energy: signals were divided by {', '.join(f'{e:.6g}' for e in energies)}."
         return replace(scan, signals=divided, pulse_energy=None, notes=(*scan.notes, note))

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from oatkit.api import Quadratic, Smooth
-from oatkit.problem import laplacian
+from oatkit.laplacian import laplacian
 
 
 class Laplacian(Quadratic, Smooth):

@@ -16,10 +16,11 @@ class Backprojection(Solver):
         \left[ 2 p_d(t) - 2 t \frac{\partial p_d}{\partial t} \right]_{t = |r - r_d| / c},
         \qquad \Omega_d = \frac{l_d \cos\theta_d}{|r - r_d|^2}
 
-    divided by the sum of the solid angles [Xu2005]_. The length l of a detector is the mean distance to its two nearest
-    neighbours, theta the angle to the line towards the middle of the array. The formula is exact for detectors on a
-    closed surface around the body; in a plane it sharpens edges and loses what is smooth. So its scale is not given by
-    theory here: the image is multiplied by the one number for which it predicts the data best. The image is signed.
+    divided by the sum of the solid angles [Xu2005]_. The sums run over the valid detectors whose record holds the time
+    of flight. The length l of a detector is the mean distance to its two nearest valid neighbours, theta the angle to
+    the line towards the middle of the valid array. The formula is exact for detectors on a closed surface around the
+    body; in a plane it sharpens edges and loses what is smooth. So its scale is not given by theory here: the image is
+    multiplied by the one number for which it predicts the data best. The image is signed.
 
     References:
         [Xu2005] Xu and Wang, Phys. Rev. E 71, 016706 (2005), 10.1103/PhysRevE.71.016706.
@@ -35,16 +36,18 @@ class Backprojection(Solver):
             raise ValidationError(
                 "backprojection: the problem must hold its geometry and its grid; oatkit.run sees to it"
             )
-        terms = _terms(geometry, problem.data.reshape(geometry.shape))
-        lengths, normals = _elements(geometry.detectors.positions_m)
+        valid = slice(None) if problem.valid is None else problem.valid
+        terms = _terms(geometry, problem.data.reshape(geometry.shape))[valid]
+        positions_m = geometry.detectors.positions_m[valid]
+        lengths, normals = _elements(positions_m)
         total, weights = np.zeros(grid.shape), np.zeros(grid.shape)
-        for d in range(geometry.detectors.count):
-            value, weight = _one_detector(geometry, grid, d, terms[d], normals[d])
+        for d, position_m in enumerate(positions_m):
+            value, weight = _one_detector(geometry, grid, position_m, terms[d], normals[d])
             total += lengths[d] * weight * value
             weights += lengths[d] * weight
             if (d + 1) % self.block == 0:
-                yield Iterate(total / np.where(weights > 0, weights, 1), d + 1)
-        yield _scaled(problem, total / np.where(weights > 0, weights, 1))
+                yield Iterate(_mean(total, weights), d + 1)
+        yield _scaled(problem, _mean(total, weights), len(positions_m))
 
 
 def _terms(geometry: Geometry, signals: np.ndarray) -> np.ndarray:
@@ -55,8 +58,15 @@ def _terms(geometry: Geometry, signals: np.ndarray) -> np.ndarray:
     return 2 * signals - 2 * geometry.times_s * slope
 
 
+def _mean(total: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return a weighted sum over its weights; 0 where no detector sees a pixel."""
+    return total / np.where(weights > 0, weights, 1)
+
+
 def _elements(positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the length of each detector, m, and the unit vector from it to the middle of the array."""
+    if not len(positions_m):
+        return np.zeros(0), np.zeros((0, 2))
     inwards = positions_m.mean(axis=0) - positions_m
     size = np.linalg.norm(inwards, axis=1, keepdims=True)
     normals = np.divide(inwards, size, out=np.zeros_like(inwards), where=size > 0)
@@ -67,33 +77,34 @@ def _elements(positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _one_detector(
-    geometry: Geometry, grid: Grid, detector: int, term: np.ndarray, normal: np.ndarray
+    geometry: Geometry, grid: Grid, position_m: np.ndarray, term: np.ndarray, normal: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return what one detector says of each pixel, and its solid angle there for a length of 1."""
-    y, x = geometry.detectors.positions_m[detector]
+    """Return what one detector says of each pixel, and its solid angle there for a length of 1; 0 beyond its record."""
+    y, x = position_m
     along_y, along_x = grid.y_m[:, None] - y, grid.x_m[None, :] - x
     distance = np.hypot(along_y, along_x)
     sample = (distance / geometry.speed_of_sound_m_s - geometry.start_time_s) * geometry.sampling_rate_hz
-    value = np.interp(sample, np.arange(geometry.n_samples), term, left=0, right=0)
+    last = geometry.n_samples - 1
+    value = np.interp(sample, np.arange(last + 1), term)
     cosine = (along_y * normal[0] + along_x * normal[1]) / distance
     # A detector without a direction, the only one or one in the very middle, sees all around.
     cosine = np.maximum(cosine, 0) if normal.any() else np.ones_like(cosine)
-    return value, cosine / distance**2
+    return value, np.where((sample >= 0) & (sample <= last), cosine / distance**2, 0)
 
 
-def _scaled(problem: Problem, image: np.ndarray) -> Iterate:
+def _scaled(problem: Problem, image: np.ndarray, summed: int) -> Iterate:
+    """Return the end: the image times the number for which it predicts the data best."""
     predicted = problem.forward(image)
     energy = inner(predicted, predicted)
     scale = inner(predicted, problem.data) / energy if energy > 0 else 0.0
     residual = norm(scale * predicted - problem.data)
-    assert problem.geometry is not None
     return Iterate(
         scale * image,
-        problem.geometry.detectors.count,
+        summed,
         objective=residual**2,
         residual_norm=residual,
         products=1,
         converged=True,
-        reason="all detectors summed" if energy > 0 else "the data are zero, or no detector sees the grid",
+        reason="all valid detectors summed" if energy > 0 else "the data are zero, or no detector sees the grid",
         details={"scale": scale},
     )

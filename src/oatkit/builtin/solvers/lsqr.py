@@ -1,16 +1,14 @@
 """Regularized least squares, signed."""
 
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import ClassVar
 
-import numpy as np
-
-from oatkit.api import Iterate, Problem, Quadratic, Solver, Weight, param
-from oatkit.builtin.regularizers.laplacian import Laplacian
+from oatkit.api import Iterate, Problem
 from oatkit.builtin.solvers.bidiagonalisation import least_squares
+from oatkit.builtin.solvers.quadratic import QuadraticSolver
 
 
-class Lsqr(Solver):
+class Lsqr(QuadraticSolver):
     """Least squares with a quadratic penalty, min |A x - b|^2 + w |L x|^2, by LSQR.
 
     The image is signed: its negative pixels mean nothing physically. Eq. 4 and 17 of [Prakash2019]_.
@@ -21,15 +19,8 @@ class Lsqr(Solver):
     """
 
     name: ClassVar[str] = "lsqr"
-    weight: Weight = param(1e-2, "weight of the penalty, as `scaling` says", above=0)
-    scaling: Literal["relative", "absolute"] = param("relative", "weight in units of |A|^2, or the w of the formula")
-    regularizer: Quadratic = param(Laplacian(), "the penalty |L x|^2")
-    n_iterations: int = param(100, "largest number of steps", at_least=1)
-    tolerance: float = param(5e-3, "stop where the gradient has fallen to this part of its start", above=0, below=1)
+    steps_by_norm: ClassVar[bool] = False
 
-    def iterate(self, problem: Problem) -> Iterator[Iterate]:
-        """Yield the iterates of LSQR; before them, the zero image while the scale is being set."""
-        for _ in problem.settle_norm():
-            yield Iterate(np.zeros(problem.shape), 0)
-        w = problem.applied_weight(self.weight, self.scaling, self.regularizer.degree)
-        yield from least_squares(problem, self.regularizer, w, self.n_iterations, self.tolerance)
+    def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:
+        """Yield the iterates of LSQR."""
+        return least_squares(problem, self.regularizer, weight, self.n_iterations, self.tolerance)

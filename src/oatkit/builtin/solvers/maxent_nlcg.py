@@ -29,7 +29,7 @@ class MaxEntNlcg(Solver):
     .. math:: P(x) = |A x - b|^2 + w \sum_i [x_i \log(x_i / m_i) - x_i + m_i]
 
     P is strictly convex, so the image depends on the data, w and m alone. Each image carries its relative gap, an upper
-    bound on (P(x) - P*) / P(x) by duality; it has converged where that is at most `tolerance`.
+    bound on (P(x) - P*) / min(P(x), |b|^2) by duality; it has converged where that is at most `tolerance`.
 
     "structural" takes for m the base image of `oatkit.api.Reference`, its negative pixels set to 0, blurred by 1.5
     pixels, plus 3 % of x_ref. A number is a flat m. The paper's form, without "- x + m", is that of m = m_paper / e.
@@ -90,7 +90,7 @@ class MaxEntNlcg(Solver):
     def _reason(self, state: Iterate) -> str:
         gap = state.relative_gap
         if gap <= self.tolerance:
-            return f"converged: P is at most {gap:.1e} of itself above the optimum"
+            return f"converged: P is at most {gap:.1e} of itself (or of |b|^2, if that is less) above the optimum"
         known = f"the gap is {gap:.1e}" if np.isfinite(gap) else "uncertified, the bound exceeds the range of floats"
         if state.iteration < self.n_iterations:
             return f"stalled after {state.iteration} iterations ({known}); take method = 'newton' or a larger weight"

@@ -1,16 +1,14 @@
 """Least squares under x >= 0."""
 
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import ClassVar
 
-import numpy as np
-
-from oatkit.api import Iterate, Problem, Quadratic, Solver, Weight, param
-from oatkit.builtin.regularizers.laplacian import Laplacian
+from oatkit.api import Iterate, Problem, param
 from oatkit.builtin.solvers.projected_gradient import projected_gradient
+from oatkit.builtin.solvers.quadratic import QuadraticSolver
 
 
-class Nnls(Solver):
+class Nnls(QuadraticSolver):
     """Non-negative least squares with a quadratic penalty, min |A x - b|^2 + w |L x|^2 over x >= 0, by FISTA.
 
     This is the true minimiser of Eq. 18 of [Prakash2019]_. It has converged where the projected gradient has fallen to
@@ -23,15 +21,10 @@ class Nnls(Solver):
     """
 
     name: ClassVar[str] = "nnls"
-    weight: Weight = param(1e-2, "weight of the penalty, as `scaling` says", above=0)
-    scaling: Literal["relative", "absolute"] = param("relative", "weight in units of |A|^2, or the w of the formula")
-    regularizer: Quadratic = param(Laplacian(), "the penalty |L x|^2")
+    steps_by_norm: ClassVar[bool] = True
     n_iterations: int = param(300, "largest number of steps", at_least=1)
     tolerance: float = param(3e-3, "stop where the projected gradient has fallen to this part", above=0, below=1)
 
-    def iterate(self, problem: Problem) -> Iterator[Iterate]:
-        """Yield the iterates of FISTA from zero; before them, the zero image while the scale is being set."""
-        for _ in problem.settle_norm():
-            yield Iterate(np.zeros(problem.shape), 0)
-        w = problem.applied_weight(self.weight, self.scaling, self.regularizer.degree)
-        yield from projected_gradient(problem, self.regularizer, w, self.n_iterations, self.tolerance)
+    def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:
+        """Yield the iterates of FISTA."""
+        return projected_gradient(problem, self.regularizer, weight, self.n_iterations, self.tolerance)
