@@ -1,7 +1,8 @@
 """One reconstruction in a process of its own, so that its time and its peak memory are its own.
 
-Called by `reconstruction.py`: ``one_reconstruction.py PROBLEM.npz PIXELS SOLVER [RESIDUAL]``; prints one line of JSON.
-With RESIDUAL, the solver is left at the first iterate whose residual (as a part of the data's norm) is at most that.
+Called by `reconstruction.py`: ``one_reconstruction.py PROBLEM.npz PIXELS SOLVER [RESIDUAL WEIGHT]``; prints one line of
+JSON. With RESIDUAL, the solver is left at the first iterate whose residual (as a part of the data's norm) is at most
+that, and its penalty has the absolute WEIGHT.
 """
 
 import json
@@ -27,7 +28,8 @@ def main() -> None:
     grid = Grid((pixels, pixels), FIELD_OF_VIEW_M / pixels)
     problem = Problem(plugin("forward_model", "arc")().operator(geometry, grid), data, grid.shape, geometry, grid)
     built = time.perf_counter()
-    for state in plugin("solver", name)().iterate(problem):
+    weight = {"weight": float(sys.argv[5]), "scaling": "absolute"} if wanted else {}
+    for state in plugin("solver", name)(**weight).iterate(problem):
         if state.residual_norm <= wanted * np.linalg.norm(data):
             break
     done = time.perf_counter()

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from oatkit import Pipeline, read
-from oatkit.engine import preprocess
+from oatkit.reconstruction import preprocess
 
 HERE = Path(__file__).parent
 SOLVERS = ("lsqr", "nnls", "maxent-nlcg", "backprojection")
@@ -79,8 +79,10 @@ def measure(problem: Path, pixels: int, options: argparse.Namespace) -> None:
     peer_command: list[str] = []
     if options.patato:
         peer_command = [str(peer_python(options.patato)), str(HERE / "peer_patato.py"), str(problem), str(pixels)]
-        reached = run(peer_command)["residual"]
-        contestants["lsqr to PATATO's residual"] = [*ours, "lsqr", str(reached)]
+        peer = run(peer_command)
+        # Its weight is 1 in its own units, next to nothing; so is ours in the comparison.
+        print(f"\nPATATO: weight 1, which is {peer['weight']:.1e} |A|^2 / |L|^2")
+        contestants["lsqr to PATATO's residual"] = [*ours, "lsqr", str(peer["residual"]), "1.0"]
         contestants["PATATO, 10 LSQR steps"] = peer_command
     rows: dict[str, list[dict[str, float]]] = {name: [] for name in contestants}
     for _ in range(options.rounds):
@@ -123,7 +125,7 @@ def run(command: list[str]) -> dict[str, float]:
     """Run one contestant and return what it printed."""
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        sys.exit(f"{' '.join(command)} failed:\n{done.stderr}")
+        sys.exit(f"{' '.join(command)} failed:\n{done.stderr[-2000:]}")
     return json.loads(done.stdout.splitlines()[-1])
 
 

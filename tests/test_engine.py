@@ -10,7 +10,7 @@ import pytest
 from oatkit import Memo, Pipeline, PluginError, SolverError, ValidationError, load, plugin, run, run_frames, steps
 from oatkit.api import ForwardModel, Iterate, Problem, Segmenter, Solver, param
 from oatkit.data import Image
-from oatkit.engine import StepDone, StepIterate
+from oatkit.events import StepDone, StepIterate
 
 SMALL = ("grid.pixels=32", "grid.field_of_view_mm=9.0")
 

@@ -15,16 +15,17 @@ HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg",
 
 ORDER = [
     {"errors", "names", "vectors", "laplacian"},
-    {"data", "atomic", "threads", "plain", "page", "hostile"},
+    {"content", "atomic", "threads", "plain", "page", "hostile"},
+    {"data"},
     {"parameters", "checked", "metrics", "scale", "scanfile"},
     {"problem", "masking"},
     {"api"},
-    {"blame", "hookspecs", "simulate"},
+    {"blame", "events", "hookspecs", "simulate"},
     {"registry", "weights"},
     {"pipeline", "reading"},
     {"provenance", "result"},
     {"manifest", "memo"},
-    {"store_writer", "figure"},
+    {"store_writer", "figure", "reconstruction"},
     {"store", "engine", "describe"},
     {"batch", "export", "summary", "progress"},
     {"demo"},
@@ -35,7 +36,9 @@ ORDER = [
 UPWARDS = {("result", "store")}
 """The one exception: `Result.save` is promised, and imports the store when it is called."""
 
-FOR_BUILTINS = {"api", "data", "errors", "laplacian", "scanfile", "hostile", "threads", "masking", "spectra", "vectors"}
+FOR_BUILTINS = {
+    "api", "content", "data", "errors", "hostile", "laplacian", "masking", "scanfile", "spectra", "threads", "vectors",
+}  # fmt: skip
 
 
 def imported(path: Path) -> set[str]:

@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from oatkit.data import Scan
-from oatkit.engine import Listener, ignore, resolve, run_resolved
+from oatkit.engine import resolve, run_resolved
 from oatkit.errors import OatkitError, ValidationError
+from oatkit.events import Listener, ignore
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.result import Result

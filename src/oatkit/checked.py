@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from oatkit.data import Geometry, read_only
+from oatkit.content import read_only
+from oatkit.data import Geometry
 from oatkit.errors import SolverError, ValidationError
 
 LARGEST = 1e150

@@ -5,59 +5,22 @@ everywhere. A step is computed again only where the scan, the frame or a step up
 """
 
 import time
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from oatkit import weights
-from oatkit.api import Iterate, Plugin, Problem, Solver, UnmixProblem
+from oatkit.api import UnmixProblem
 from oatkit.blame import blame
-from oatkit.data import Grid, Image, Scan
-from oatkit.errors import PluginError, SolverError
-from oatkit.masking import without_rows
+from oatkit.data import Image, Scan
+from oatkit.errors import PluginError
+from oatkit.events import Event, Listener, StepDone, StepIterate, StepStarted, ignore
 from oatkit.memo import Memo
-from oatkit.metrics import negative_pixels
 from oatkit.pipeline import Pipeline
 from oatkit.provenance import versions
+from oatkit.reconstruction import check_finite, preprocess, problems, raw_key, reconstruct
 from oatkit.result import Result
 from oatkit.vectors import norm
-
-
-@dataclass(frozen=True)
-class StepStarted:
-    """A step begins."""
-
-    step: str
-
-
-@dataclass(frozen=True)
-class StepIterate:
-    """A solver has taken a step."""
-
-    step: str
-    wavelength_nm: float
-    iterate: Iterate
-
-
-@dataclass(frozen=True)
-class StepDone:
-    """A step has ended; `images` holds what it made, by name."""
-
-    step: str
-    seconds: float
-    images: Mapping[str, Image]
-    notes: tuple[str, ...] = ()
-
-
-Event = StepStarted | StepIterate | StepDone
-Listener = Callable[[Event], None]
-
-
-def ignore(event: Event) -> None:
-    """Listen to nothing."""
 
 
 def run(
@@ -117,9 +80,9 @@ def steps(pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = No
     clean, grid = preprocess(pipeline, scan, frame, memo), pipeline.grid.grid()
     yield StepDone("preprocess", time.perf_counter() - start, {}, clean.notes[len(scan.notes) :])
 
-    chain = (*_raw_key(pipeline, scan, frame), pipeline.grid, pipeline.forward, pipeline.reconstruct)
+    chain = (*raw_key(pipeline, scan, frame), pipeline.grid, pipeline.forward, pipeline.reconstruct)
     images: dict[str, Image] = {}
-    for event in _memoised(memo, chain, "reconstruct", _reconstruct(pipeline, clean, grid, memo)):
+    for event in _memoised(memo, chain, "reconstruct", reconstruct(pipeline, clean, grid, memo)):
         yield event
         images |= _images_of(event)
     for name in ("segment", "unmix"):
@@ -130,30 +93,6 @@ def steps(pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = No
         for event in _memoised(memo, chain, name, _single(name, plugin, dict(images))):
             yield event
             images |= _images_of(event)
-
-
-def preprocess(pipeline: Pipeline, scan: Scan, frame: int, memo: Memo | None = None) -> Scan:
-    """Return one frame after all steps of ``preprocess``, checked to be finite and seen by the grid."""
-    memo = Memo() if memo is None else memo
-    one = partial(_preprocess, pipeline, scan, frame)
-    clean = memo.get(_raw_key(pipeline, scan, frame), one, lambda made: int(np.asarray(made.signals).nbytes))
-    clean.geometry.check_grid(pipeline.grid.grid())
-    return clean
-
-
-def problems(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iterator[tuple[float, Problem]]:
-    """Yield wavelength (nm) and problem for each wavelength of a preprocessed frame."""
-    key = (clean.geometry, grid, pipeline.forward)
-    operator = memo.keep(key, partial(_operator, pipeline, clean, grid))
-    for wavelength, record, valid in zip(clean.wavelengths_nm, clean.signals[0], clean.valid[0], strict=True):
-        rows = np.repeat(valid, clean.geometry.n_samples)
-        used = operator
-        if not valid.all():
-            used = memo.get(
-                (key, valid.tobytes()), partial(without_rows, operator, rows), lambda made: made.rows.nbytes
-            )
-        data = np.where(rows, np.ravel(record), 0)
-        yield wavelength, Problem(used, data, grid.shape, clean.geometry, grid, valid)
 
 
 def resolve(
@@ -195,43 +134,6 @@ def describe_scan(scan: Scan, pipeline: Pipeline) -> dict[str, Any]:
     }
 
 
-def history_of(pipeline: Pipeline) -> tuple[dict[str, Any], ...]:
-    """Return the steps up to the reconstruction as plain tables, each with the name of its slot."""
-    chain: list[tuple[str, Plugin]] = [("preprocess", p) for p in pipeline.preprocess]
-    chain += [("forward", pipeline.forward), ("reconstruct", pipeline.reconstruct)]
-    return tuple({"step": slot, **plugin.model_dump()} for slot, plugin in chain)
-
-
-def _raw_key(pipeline: Pipeline, scan: Scan, frame: int) -> tuple[Any, ...]:
-    return (scan.fingerprint, scan.notes, frame, pipeline.scan, pipeline.preprocess)
-
-
-def _preprocess(pipeline: Pipeline, scan: Scan, frame: int) -> Scan:
-    one = pipeline.scan.apply(scan.frame(frame))
-    for plugin in pipeline.preprocess:
-        before = one.signals.shape[:3]
-        with blame(plugin):
-            one = plugin.process(one)
-        if not isinstance(one, Scan) or one.signals.shape[:3] != before:
-            raise PluginError(
-                f"preprocessor '{plugin.name}' returned no scan of (frame, wavelength, detector) {before}"
-            )
-    used = np.asarray(one.signals)[one.valid]
-    if not np.isfinite(used).all():
-        raise SolverError(f"frame {frame}: {(~np.isfinite(used)).sum()} samples of valid channels are not finite")
-    return one
-
-
-def _operator(pipeline: Pipeline, clean: Scan, grid: Grid) -> Any:
-    with blame(pipeline.forward):
-        operator = pipeline.forward.operator(clean.geometry, grid)
-    expected = (clean.geometry.detectors.count * clean.geometry.n_samples, grid.shape[0] * grid.shape[1])
-    if tuple(operator.shape) != expected:
-        name = pipeline.forward.name
-        raise PluginError(f"forward model '{name}': operator of shape {tuple(operator.shape)}, not {expected}")
-    return operator
-
-
 def _memoised(memo: Memo, key: tuple[Any, ...], step: str, work: Iterator[Any]) -> Iterator[Event]:
     """Yield the events of a step whose work yields iterates and at last a dict of images, unless it is known."""
     yield StepStarted(step)
@@ -245,52 +147,6 @@ def _memoised(memo: Memo, key: tuple[Any, ...], step: str, work: Iterator[Any]) 
                 images = item
         memo.put(key, images, sum(image.values.nbytes for image in images.values()))
     yield StepDone(step, time.perf_counter() - start, images, _warnings(step, images))
-
-
-def _reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iterator[Any]:
-    """Yield an iterate for each step of the solver at each wavelength, then the image of initial pressure."""
-    solver = pipeline.reconstruct
-    last: list[Iterate] = []
-    norms: list[float] = []
-    for wavelength, problem in problems(pipeline, clean, grid, memo):
-        state = None
-        with blame(solver):
-            for state in solver.iterate(problem):
-                yield StepIterate("reconstruct", wavelength, state)
-        last.append(_checked_iterate(solver, state, problem))
-        norms.append(norm(problem.data))
-    with np.errstate(over="ignore"):
-        values = np.stack([state.image for state in last]).astype(np.float32)
-    made = Image(values, "initial_pressure", "a.u.", grid, clean.wavelengths_nm, history_of(pipeline))
-    _check_finite(solver, "initial_pressure", made)
-    yield {"initial_pressure": replace(made, diagnostics=_diagnose(values, last, norms))}
-
-
-def _checked_iterate(solver: Solver, state: Iterate | None, problem: Problem) -> Iterate:
-    if state is None:
-        raise PluginError(f"solver '{solver.name}' ended without yielding an image")
-    shape = np.shape(state.image)
-    if shape != problem.shape:
-        raise PluginError(f"solver '{solver.name}' returned an image of shape {shape}, not {problem.shape}")
-    return state
-
-
-def _check_finite(plugin: Plugin, name: str, image: Image) -> None:
-    """Raise `SolverError` for infinite pixels, and for NaN where every pixel has a value: in the initial pressure."""
-    wrong = ~np.isfinite(image.values) if name == "initial_pressure" else np.isinf(image.values)
-    if wrong.any():
-        kind = plugin.kind.replace("_", " ")
-        raise SolverError(f"{kind} '{plugin.name}' returned {wrong.sum()} pixels of '{name}' that are not finite")
-
-
-def _diagnose(values: np.ndarray, last: list[Iterate], norms: list[float]) -> dict[str, Any]:
-    """Return what is worth knowing of a reconstruction, one entry for each wavelength."""
-    names = ("iteration", "products", "objective", "residual_norm", "penalty", "relative_gap", "converged", "reason")
-    table: dict[str, Any] = {name: tuple(getattr(state, name) for state in last) for name in names}
-    table["data_norm"] = tuple(norms)
-    table["negative_pixels"] = tuple(negative_pixels(plane).count for plane in values)
-    table["details"] = tuple(dict(state.details) for state in last)
-    return table
 
 
 def _warnings(step: str, images: Mapping[str, Image]) -> tuple[str, ...]:
@@ -318,7 +174,7 @@ def _single(name: str, plugin: Any, images: dict[str, Image]) -> Iterator[dict[s
         if not isinstance(image, Image) or image.grid != pressure.grid:
             kind = plugin.kind.replace("_", " ")
             raise PluginError(f"{kind} '{plugin.name}' returned no image on the grid as '{key}'")
-        _check_finite(plugin, key, image)
+        check_finite(plugin, key, image)
         made[key] = replace(image, history=(*pressure.history, history))
     yield made
 

@@ -3,7 +3,7 @@
 import sys
 from typing import Any
 
-from oatkit.engine import Event, StepDone, StepIterate, StepStarted
+from oatkit.events import Event, StepDone, StepIterate, StepStarted
 
 
 class ProgressBar:

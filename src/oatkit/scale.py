@@ -8,7 +8,7 @@ from weakref import finalize
 
 import numpy as np
 
-from oatkit.data import read_only
+from oatkit.content import read_only
 from oatkit.laplacian import laplacian
 from oatkit.vectors import inner, norm
 

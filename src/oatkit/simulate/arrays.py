@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from oatkit.data import Detectors, Geometry, check_range
+from oatkit.content import check_range
+from oatkit.data import Detectors, Geometry
 
 
 def arc_detectors(n: int = 256, radius_m: float = 0.0405, coverage_deg: float = 270.0) -> Detectors:

@@ -9,7 +9,8 @@ from functools import cache
 
 import numpy as np
 
-from oatkit.data import Grid, Image, check_range, read_only
+from oatkit.content import check_range, read_only
+from oatkit.data import Grid, Image
 from oatkit.errors import ValidationError
 from oatkit.names import did_you_mean
 from oatkit.simulate.anatomy import Anatomy

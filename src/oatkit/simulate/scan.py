@@ -5,7 +5,8 @@ from typing import Literal
 import numpy as np
 
 from oatkit.api import ForwardModel
-from oatkit.data import Geometry, Grid, Scan, check_range
+from oatkit.content import check_range
+from oatkit.data import Geometry, Grid, Scan
 from oatkit.errors import ValidationError
 from oatkit.simulate.arrays import msot_geometry
 from oatkit.simulate.phantoms import Phantom, truth

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from oatkit.builtin.readers.fingerprint import sampled_fingerprint
-from oatkit.data import read_only
+from oatkit.content import read_only
 from oatkit.errors import ReadError
 from oatkit.hostile import regular_file
 
