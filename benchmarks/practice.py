@@ -15,11 +15,6 @@ ROWS = (
     ("lsqr", "stopped after 20 steps", ("reconstruct.n_iterations=20",)),
     ("lsqr", "0.1 .. 7 MHz", BAND),
     ("lsqr", "0.1 .. 7 MHz, 20 steps", (*BAND, "reconstruct.n_iterations=20")),
-    (
-        "lsqr",
-        "0.1 .. 7 MHz, to tolerance 0.0005",
-        (*BAND, "reconstruct.n_iterations=400", "reconstruct.tolerance=0.0005"),
-    ),
     ("lsqr-threshold", "the preset", ()),
     ("nnls", "the preset", ()),
     ("maxent", "the preset", ()),

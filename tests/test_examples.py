@@ -72,3 +72,11 @@ def test_the_readmes_solver_works():
     assert residuals[-1] < 1e-3 * np.sqrt(2) < residuals[0]
     assert names["oatkit_solvers"]() == [names["Landweber"]]
     assert "oatkit" in tomllib.loads(next(b for b in blocks("toml") if "entry-points" in b))["project"]["entry-points"]
+
+
+@pytest.mark.parametrize("page", ["README.md", *(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md"))])
+def test_links_lead_somewhere(page):
+    """Every relative link and picture of a page is a file of the repository."""
+    text = (ROOT / page).read_text()
+    targets = [t for t in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in t]
+    assert [t for t in targets if not ((ROOT / page).parent / t).exists()] == []

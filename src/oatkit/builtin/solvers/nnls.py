@@ -22,7 +22,6 @@ class Nnls(QuadraticSolver):
 
     name: ClassVar[str] = "nnls"
     steps_by_norm: ClassVar[bool] = True
-    n_iterations: int = param(300, "largest number of steps", at_least=1)
     tolerance: float = param(3e-3, "stop where the projected gradient has fallen to this part", above=0, below=1)
 
     def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:

@@ -19,8 +19,8 @@ class QuadraticSolver(Solver):
     weight: Weight = param(1e-2, "weight of the penalty, as `scaling` says", above=0)
     scaling: Literal["relative", "absolute"] = param("relative", "weight in units of |A|^2, or the w of the formula")
     regularizer: Quadratic = param(Laplacian(), "the penalty |L x|^2")
-    n_iterations: int = param(100, "largest number of steps", at_least=1)
-    tolerance: float = param(5e-3, "stop where the gradient has fallen to this part of its start", above=0, below=1)
+    n_iterations: int = param(300, "largest number of steps", at_least=1)
+    tolerance: float = param(1e-3, "stop where the gradient has fallen to this part of its start", above=0, below=1)
 
     @abstractmethod
     def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:
