@@ -38,6 +38,8 @@ class ProgressBar:
 
 def _iterate_text(event: StepIterate) -> str:
     iterate = event.iterate
+    if iterate.iteration == 0:
+        return f"{event.wavelength_nm:g} nm, setting the scale"
     parts = [f"{event.wavelength_nm:g} nm", f"step {iterate.iteration}", f"residual {iterate.residual_norm:.3g}"]
     if iterate.relative_gap == iterate.relative_gap:  # not NaN
         parts.append(f"gap {iterate.relative_gap:.1e}")
