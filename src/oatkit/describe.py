@@ -67,8 +67,8 @@ def scan_table(scan: Scan) -> dict[str, Any]:
 
 def _mean(values: np.ndarray | None) -> float | None:
     """Return the mean of what is known, None where nothing is."""
-    known = [] if values is None else values[np.isfinite(values)]
-    return float(np.mean(known)) if len(known) else None
+    known = np.array([]) if values is None else values[np.isfinite(values)]
+    return float(np.mean(known)) if known.size else None
 
 
 def scan_text(scan: Scan) -> str:

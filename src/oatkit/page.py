@@ -109,7 +109,7 @@ def png(figure: Figure) -> bytes:
 
 
 def _size(values: np.ndarray) -> float:
-    return float(abs(values).max(initial=0)) or 1.0
+    return float(np.max(abs(values), initial=0)) or 1.0
 
 
 def _round_length(length: float) -> float:

@@ -59,9 +59,9 @@ class ArcOperator:
         self.detectors = geometry.detectors.positions_m / step_m
         self.origins = finer * (geometry.start_time_s * geometry.sampling_rate_hz + first)
         nodes = self.origins[:, None] + np.arange(self.filter.n_in)
-        if not nodes.max() <= FARTHEST_STEPS[self.dtype.name]:
+        if not np.max(nodes) <= FARTHEST_STEPS[self.dtype.name]:
             raise ValidationError(
-                f"arc: the farthest pixel is {nodes.max():.3g} time steps from a detector, more than the "
+                f"arc: the farthest pixel is {np.max(nodes):.3g} time steps from a detector, more than the "
                 f'{FARTHEST_STEPS[self.dtype.name]} that {self.dtype.name} can resolve; set precision = "double", '
                 "or check the sampling rate (the unit is Hz)"
             )

@@ -56,4 +56,4 @@ def reached(geometry: Geometry, grid: Grid) -> Windows:
     start = geometry.start_time_s * geometry.sampling_rate_hz
     first = np.floor(near / step_m - start).astype(np.int64) - SPARE
     last = np.ceil(far / step_m - start).astype(np.int64) + SPARE
-    return Windows(first, int((last - first).max()) + 1, geometry.n_samples)
+    return Windows(first, int(np.max(last - first)) + 1, geometry.n_samples)

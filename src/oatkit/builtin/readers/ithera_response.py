@@ -56,7 +56,7 @@ def _largest_magnitude(values: np.ndarray, origin: str) -> float:
     """Return the largest magnitude of the spectrum. Raises `ReadError` where it is no positive number."""
     if not np.isfinite(values).all():
         raise ReadError(f"{origin}: expected finite numbers, found {(~np.isfinite(values)).sum()} that are not")
-    largest = float(abs(np.fft.rfft(values)).max())
+    largest = float(np.max(abs(np.fft.rfft(values))))
     if not 0 < largest < float("inf"):
         raise ReadError(f"{origin}: expected an impulse response, found only zeros or numbers out of range")
     return largest

@@ -73,7 +73,7 @@ def _elements(positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     distances = np.linalg.norm(positions_m[:, None] - positions_m[None], axis=2)
     nearest = np.sort(distances, axis=1)[:, 1:3]
     lengths = nearest.mean(axis=1) if nearest.size else np.ones(len(positions_m))
-    return np.where(lengths > 0, lengths, lengths.max() or 1.0), normals
+    return np.where(lengths > 0, lengths, np.max(lengths) or 1.0), normals
 
 
 def _one_detector(

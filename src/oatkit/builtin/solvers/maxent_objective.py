@@ -93,7 +93,7 @@ class Point:
         """
         weight = self.objective.weight
         exponent = np.log(self.objective.prior) - 2 * self.slope / weight
-        if exponent.max() > 700:
+        if np.max(exponent) > 700:
             return float("inf")
         return weight * relative_entropy(self.image, self.gradient / weight, np.exp(exponent))
 
