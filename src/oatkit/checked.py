@@ -18,6 +18,8 @@ def as_operator(operator: Any) -> Any:
         from scipy.sparse.linalg import aslinearoperator  # slow to import: only for bare matrices
 
         try:
+            if np.ndim(operator) > 2:
+                raise ValueError  # newer scipys take stacks of matrices
             operator = aslinearoperator(operator)
         except (TypeError, ValueError):
             raise ValidationError(

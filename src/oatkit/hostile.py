@@ -50,8 +50,11 @@ def read_at_most(path: Path, limit: int) -> bytes:
 def inside(folder: Path, name: str) -> Path:
     """Return the path of `name` in `folder`; refuse one that leads out of it, by itself or through a symbolic link."""
     try:
-        path = folder / name
-        if path.resolve().is_relative_to(folder.resolve()) and path.resolve() != folder.resolve():
+        path, root = folder / name, folder.resolve()
+        resolved = path.resolve()
+        if resolved.is_symlink():  # newer Pythons leave a circle of links as it is
+            raise OSError("a circle of symbolic links")
+        if resolved.is_relative_to(root) and resolved != root:
             return path
     except (OSError, ValueError, RuntimeError) as error:
         raise ReadError(f"{folder}: {name!r} is no file name ({error})") from None
