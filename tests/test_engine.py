@@ -213,6 +213,20 @@ def test_a_weight_rule_is_resolved_once_and_recorded(small_scan, tmp_path):
     assert np.array_equal(again["initial_pressure"].values, result["initial_pressure"].values)
 
 
+def test_a_speed_of_sound_by_focus_is_resolved_once_and_recorded(small_scan, tmp_path):
+    """With `focus` the result holds the word, the number that was found, the curve, and what the file says."""
+    result = run(small("lsqr", "scan.speed_of_sound_m_s=focus"), small_scan)
+    assert result.requested["scan"]["speed_of_sound_m_s"] == "focus"
+    found = result.pipeline["scan"]["speed_of_sound_m_s"]
+    assert found == result.speed_choice["speed_m_s"] == result.scan["speed_of_sound_m_s"]
+    assert result.scan["speed_of_sound_source"].startswith("focus; the file's is 1500.0 m/s")
+    result.save(tmp_path / "out.zarr")
+    kept = load(tmp_path / "out.zarr").speed_choice["scores"]["variance"]
+    assert kept == tuple(result.speed_choice["scores"]["variance"])
+    again = run(small("lsqr", f"scan.speed_of_sound_m_s={found!r}"), small_scan)
+    assert np.array_equal(again["initial_pressure"].values, result["initial_pressure"].values)
+
+
 def test_solving_with_an_unresolved_rule_is_refused(small_scan):
     """A solver handed the word instead of a number says so."""
     solver = small("lsqr", "reconstruct.weight=l-curve").reconstruct

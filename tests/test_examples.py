@@ -41,9 +41,9 @@ def test_the_examples_on_the_science_page_hold():
     assert result.attempted >= 5
 
 
-def blocks(language: str) -> list[str]:
-    """The README's blocks of code in a language."""
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+def blocks(language: str, text: str = README) -> list[str]:
+    """The blocks of code in a language, of the README or of another page."""
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
 def test_the_readmes_script_runs(small_scan_file, tmp_path, monkeypatch):
@@ -53,6 +53,19 @@ def test_the_readmes_script_runs(small_scan_file, tmp_path, monkeypatch):
     small = '"maxent", ["grid.pixels=32", "grid.field_of_view_mm=9"]'
     exec(script.replace('"Scan_9.msot"', repr(str(small_scan_file))).replace('"maxent"', small))
     assert oatkit.load(tmp_path / "out.zarr")["initial_pressure"].values.min() >= 0
+
+
+def test_the_page_on_absorption_shows_what_runs(tmp_path):
+    """Its pipeline loads with all its steps, its script runs, and each of its commands names options that exist."""
+    text = (ROOT / "docs" / "absorption.md").read_text()
+    (tmp_path / "p.toml").write_text(blocks("toml", text)[0])
+    pipeline = oatkit.Pipeline.load(tmp_path / "p.toml")
+    assert None not in (pipeline.segment, pipeline.fluence, pipeline.absorption)
+    (script,) = blocks("python", text)
+    exec(script, {})
+    changes = re.findall(r"--set ([^\s`]+)", text)
+    assert oatkit.Pipeline.load("maxent-absorption", [c for c in changes if "segment" not in c]).absorption is not None
+    assert oatkit.Pipeline.load("maxent-absorption", [c for c in changes if "segment" in c]).segment.name == "mask"
 
 
 def test_the_readmes_pipeline_loads(tmp_path):

@@ -15,20 +15,22 @@ HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg",
 
 ORDER = [
     {"errors", "names", "vectors", "laplacian"},
-    {"content", "atomic", "threads", "plain", "page", "hostile"},
-    {"data"},
-    {"parameters", "checked", "metrics", "scale", "scanfile"},
-    {"problem", "masking"},
-    {"api"},
-    {"blame", "events", "hookspecs", "simulate"},
+    {"content", "atomic", "threads", "plain", "page", "hostile", "focus_metrics"},
+    {"data", "plot"},
+    {"parameters", "checked", "metrics", "optics", "polygons", "scale", "scanfile", "spectra", "words"},
+    {"problem", "masking", "tables"},
+    {"absorption", "api"},
+    {"blame", "events", "fixed_point", "hookspecs", "simulate"},
     {"registry", "weights"},
     {"pipeline", "reading"},
     {"provenance", "result"},
-    {"manifest", "memo"},
+    {"manifest", "memo", "sheet"},
     {"store_writer", "figure", "reconstruction"},
-    {"store", "engine", "describe"},
+    {"quantification", "focus"},
+    {"rules"},
+    {"store", "engine", "describe", "focus_figure"},
     {"batch", "export", "summary", "progress"},
-    {"demo"},
+    {"demo", "paper"},
     {"cli"},
 ]
 """Layers of modules from the ground up: a module imports only from layers below its own."""
@@ -37,7 +39,8 @@ UPWARDS = {("result", "store")}
 """The one exception: `Result.save` is promised, and imports the store when it is called."""
 
 FOR_BUILTINS = {
-    "api", "content", "data", "errors", "hostile", "laplacian", "masking", "scanfile", "spectra", "threads", "vectors",
+    "api", "content", "data", "errors", "hostile", "laplacian", "masking", "polygons", "scanfile", "spectra",
+    "threads", "vectors",
 }  # fmt: skip
 
 

@@ -4,12 +4,13 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from oatkit.data import Scan
-from oatkit.engine import resolve, run_resolved
+from oatkit.engine import run_resolved
 from oatkit.errors import OatkitError, ValidationError
 from oatkit.events import Listener, ignore
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.result import Result
+from oatkit.rules import resolve
 from oatkit.store import StoreWriter, load
 
 
@@ -24,9 +25,9 @@ def run_frames(
 ) -> Result:
     """Run `pipeline` over `frames` (all unless said) and return the result that now lies in the folder `path`.
 
-    The weight is chosen and the operator built once. A frame that fails is recorded with its reason and the rest goes
-    on. Raises `ValidationError` for a frame that does not exist, `ResultError` where the result cannot be written, and
-    the frame's own error where every frame failed; then nothing is left at `path`.
+    Rules (weight, speed of sound) are replaced and the operator built once. A frame that fails is recorded with its
+    reason and the rest goes on. Raises `ValidationError` for a frame that does not exist, `ResultError` where the
+    result cannot be written, and the frame's own error where every frame failed; then nothing is left at `path`.
     """
     chosen = list(range(scan.frames) if frames is None else frames)
     missing = [f for f in chosen if not 0 <= f < scan.frames]
@@ -35,11 +36,11 @@ def run_frames(
     with StoreWriter(path, frames=len(chosen), source=scan.source, overwrite=overwrite) as writer:
         memo = Memo()
         scan.geometry.check_grid(pipeline.grid.grid())  # a slip of the pipeline's is not each frame's failure
-        resolved, choice = resolve(pipeline, scan, memo, on_event)
+        resolved = resolve(pipeline, scan, memo, on_event)
         failures = []
         for index, frame in enumerate(chosen):
             try:
-                result = run_resolved(resolved, pipeline, choice, scan, frame, memo, on_event)
+                result = run_resolved(resolved, scan, frame, memo, on_event)
             except OatkitError as error:
                 failures.append(error)
                 writer.fail(index, f"frame {frame}: {error}")

@@ -129,6 +129,33 @@ def demo(
 
 
 @command
+def paper(
+    experiment: Annotated[
+        str, typer.Argument(metavar="EXPERIMENT", help="Its name; without it, the list of experiments.")
+    ] = "",
+    folder: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Where to write.")] = Path(
+        "oatkit-paper"
+    ),
+    scan: Annotated[
+        Path | None, typer.Option(metavar="SCAN", help="A real scan of a mouse, for fig5, fig6 and table1.")
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Repeat an experiment of Prakash et al. 2019: a figure, and a table of the paper's figures beside ours."""
+    from oatkit.paper.experiments import EXPERIMENTS
+    from oatkit.paper.running import run_experiment
+
+    if not experiment:
+        for name, what in EXPERIMENTS.items():
+            typer.echo(f"{name:<10}{what}")
+        return
+    start = time.perf_counter()
+    for line in run_experiment(experiment, folder, scan, overwrite):
+        typer.echo(line)
+    typer.echo(f"done in {time.perf_counter() - start:.0f} s")
+
+
+@command
 def info(scan: ScanPath, as_json: AsJson = False) -> None:
     """Print what is in a scan file, and where its speed of sound came from."""
     from oatkit.describe import scan_table, scan_text
@@ -170,6 +197,48 @@ def run(
     typer.echo(f"wrote {output} in {time.perf_counter() - start:.1f} s")
     if result.failed:
         raise SolverError(f"{len(result.failed)} of {len(chosen)} frames failed")
+
+
+@command
+def focus(
+    scan: ScanPath,
+    pipeline: Annotated[
+        str, typer.Option(metavar="PIPELINE", help="Whose preprocessing, grid and acoustic model are used.")
+    ] = "maxent",
+    changes: Changes = [],  # noqa: B006 - typer wants a plain list
+    metric: Annotated[str, typer.Option(metavar="NAME", help="The measure of sharpness that decides.")] = "variance",
+    lowest: Annotated[float | None, typer.Option(help="Lowest speed to try, m/s.")] = None,
+    highest: Annotated[float | None, typer.Option(help="Highest speed to try, m/s.")] = None,
+    frame: Annotated[int, typer.Option(min=0, help="Which frame.")] = 0,
+    figure: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE.png", help="Draw the curves into this file.")
+    ] = None,
+    as_json: AsJson = False,
+    overwrite: Overwrite = False,
+) -> None:
+    """Find the speed of sound that gives the sharpest image; to use it: --set scan.speed_of_sound_m_s=focus."""
+    from oatkit.describe import focus_text
+    from oatkit.focus import focus as find
+    from oatkit.pipeline import Pipeline
+    from oatkit.progress import ProgressBar
+    from oatkit.reading import read
+
+    if (lowest is None) != (highest is None):
+        raise ValidationError("--lowest and --highest go together: give both, or neither")
+    if figure is not None:
+        _check_new(figure, overwrite)
+    loaded, found = Pipeline.load(pipeline, changes), read(scan)
+    speeds = None if lowest is None or highest is None else (lowest, highest)
+    with ProgressBar() as bar:
+        result = find(loaded, found, speeds_m_s=speeds, frame=frame, metric=metric, on_event=bar.show)
+    typer.echo(json.dumps(result.table(), indent=2, allow_nan=False) if as_json else focus_text(result))
+    if figure is not None:
+        from oatkit.atomic import write_file
+        from oatkit.focus_figure import focus_figure  # matplotlib
+        from oatkit.page import png
+
+        write_file(figure, png(focus_figure(result)), overwrite)
+        typer.echo(f"wrote {figure}", err=as_json)
 
 
 @command

@@ -8,6 +8,7 @@ import numpy as np
 
 from oatkit.api import Plugin
 from oatkit.data import Scan
+from oatkit.focus import Focus
 from oatkit.parameters import Parameters, bounds_of, expected
 
 
@@ -89,6 +90,18 @@ def scan_text(scan: Scan) -> str:
     }
     lines = [f"{name:<18}{value}" for name, value in rows.items()]
     return "\n".join([*lines, *(f"note: {note}" for note in table["notes"])])
+
+
+def focus_text(focus: Focus) -> str:
+    """Return a speed of sound by focus as lines: the pick, what the scan says, what the other metrics pick."""
+    rows = [
+        ("speed of sound", f"{focus.speed_m_s:.1f} m/s by focus ({focus.metric})"),
+        ("the scan says", f"{focus.header_m_s:.1f} m/s ({focus.header_source})"),
+        ("tried", f"{len(focus.speeds_m_s)} speeds, {focus.speeds_m_s[0]:.0f} .. {focus.speeds_m_s[-1]:.0f} m/s"),
+        *((name, f"{pick:.1f} m/s") for name, pick in focus.picks.items() if name != focus.metric),
+    ]
+    lines = [f"{name:<20}{value}" for name, value in rows]
+    return "\n".join([*lines, *(f"note: {note}" for note in focus.notes)])
 
 
 def _default(value: Any) -> str:

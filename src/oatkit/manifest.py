@@ -130,6 +130,7 @@ class Manifest(_Entry):
     versions: Plain
     scan: Plain
     weight_choice: Plain
+    speed_choice: Plain = Field(default_factory=dict)
     images: dict[ImageName, ImageEntry]
     records: dict[FrameKey, FrameEntry]
     """By the number of the frame in this result."""

@@ -30,6 +30,8 @@ SCALE_BAR = 240
 """Greatest length of a scale bar in dots."""
 INK, PALE, UNDEFINED = "#1a1a1a", "#666666", "#d8d4cc"
 RED = (1.0, 0.0, 0.0, 1.0)
+LINE = "#19c1ff"
+"""Colour of what is drawn over an image: neither a grey nor the red of negative pixels."""
 PERCENTILE = 99.9
 
 
@@ -73,7 +75,7 @@ class Page:
 
     def image(self, left: int, bottom: int, width: int, height: int, colours: np.ndarray) -> None:
         """Draw pixels, row 0 at the bottom."""
-        axes = self._axes(left, bottom, width, height)
+        axes = self.axes(left, bottom, width, height)
         axes.imshow(colours, origin="lower", interpolation="nearest", aspect="auto")
         axes.set_axis_off()
 
@@ -90,14 +92,23 @@ class Page:
         """Draw the values of a scale, with what they are."""
         numbers = ScalarFormatter(useMathText=True)
         numbers.set_powerlimits((-2, 4))
-        axes = self._axes(left, bottom, BAR_WIDTH, height)
+        axes = self.axes(left, bottom, BAR_WIDTH, height)
         bar = self.figure.colorbar(ScalarMappable(scale.normalise, scale.colours), axes, format=numbers)
         axes.tick_params(labelsize=7.5, length=2, width=0.5, colors=INK)
         axes.yaxis.get_offset_text().set(size=7.5, ha="left")
         bar.outline.set(edgecolor=PALE, linewidth=0.5)
         bar.set_label(label, size=8, color=INK)
 
-    def _axes(self, left: int, bottom: int, width: int, height: int) -> Any:
+    def outline(self, left: int, bottom: int, width: int, height: int, signed: np.ndarray) -> None:
+        """Draw the line along which `signed`, of one value for each pixel of the image in that box, is zero."""
+        axes = self.axes(left, bottom, width, height)
+        rows, columns = signed.shape
+        axes.contour(signed, levels=[0], colors=[LINE], linewidths=0.9)
+        axes.set(xlim=(-0.5, columns - 0.5), ylim=(-0.5, rows - 0.5))
+        axes.set_axis_off()
+
+    def axes(self, left: int, bottom: int, width: int, height: int) -> Any:
+        """Return matplotlib's axes over a box of the page."""
         return self.figure.add_axes((left / self.width, bottom / self.height, width / self.width, height / self.height))
 
 

@@ -8,44 +8,15 @@ from typing import Any, ClassVar, Literal, Self
 
 import pydantic
 
-from oatkit.api import ForwardModel, Preprocessor, Segmenter, Solver, Unmixer
-from oatkit.data import Grid, Scan
+from oatkit.api import FluenceModel, ForwardModel, Preprocessor, Segmenter, Solver, Unmixer
 from oatkit.errors import ValidationError
 from oatkit.names import did_you_mean
 from oatkit.parameters import Context, Parameters, param, problems
 from oatkit.registry import installed
+from oatkit.tables import AbsorptionTable, GridTable, OpticsTable, ScanTable
 
-
-class ScanTable(Parameters):
-    """The table ``[scan]``: what is known better than the file says."""
-
-    speed_of_sound_m_s: float | None = param(
-        None, "speed of sound, in place of the file's", unit="m/s", at_least=300, at_most=7000
-    )
-    start_time_us: float | None = param(
-        None, "time of the first sample after the light pulse, in place of the file's", unit="us"
-    )
-
-    def apply(self, scan: Scan) -> Scan:
-        """Return the scan with its values overridden."""
-        if self.speed_of_sound_m_s is not None:
-            scan = scan.with_speed_of_sound(self.speed_of_sound_m_s, "pipeline")
-        if self.start_time_us is not None:
-            scan = scan.with_start_time(self.start_time_us * 1e-6)
-        return scan
-
-
-class GridTable(Parameters):
-    """The table ``[grid]``: the square image to reconstruct."""
-
-    pixels: int = param(200, "pixels along each side", at_least=2, at_most=8192)
-    field_of_view_mm: float = param(25.0, "length of each side", unit="mm", above=0)
-    centre_mm: tuple[float, float] = param((0.0, 0.0), "middle of the image, (y, x)", unit="mm")
-
-    def grid(self) -> Grid:
-        """Return the grid in SI units. Raises `ValidationError` for pixels of an impossible size."""
-        y, x = self.centre_mm
-        return Grid((self.pixels, self.pixels), self.field_of_view_mm * 1e-3 / self.pixels, (y * 1e-3, x * 1e-3))
+BUILDS_ON: Mapping[str, str] = {"fluence": "segment", "absorption": "fluence"}
+"""Which step needs which other one."""
 
 
 class Pipeline(Parameters):
@@ -61,6 +32,9 @@ class Pipeline(Parameters):
     forward: ForwardModel = param(..., "acoustic model")
     reconstruct: Solver = param(..., "from signals to initial pressure")
     segment: Segmenter | None = param(None, "from initial pressure to the boundary of the body")
+    optics: OpticsTable = param(OpticsTable(), "how the body absorbs and scatters light, for the fluence")
+    fluence: FluenceModel | None = param(None, "from boundary and optics to the light in the body")
+    absorption: AbsorptionTable | None = param(None, "from initial pressure and fluence to absorption")
     unmix: Unmixer | None = param(None, "from wavelengths to chromophores")
 
     @classmethod
@@ -90,7 +64,21 @@ class Pipeline(Parameters):
             pipeline.grid.grid()
         except ValidationError as error:
             raise ValidationError(f"{origin} [grid]: {error}") from None
+        try:
+            pipeline.check_order()
+        except ValidationError as error:
+            raise ValidationError("\n".join(f"{origin} {line}" for line in str(error).splitlines())) from None
         return pipeline
+
+    def check_order(self) -> None:
+        """Raise `ValidationError` where a step lacks one that it builds on."""
+        lacking = [
+            f"[{step}] needs [{needed}], which is missing"
+            for step, needed in BUILDS_ON.items()
+            if getattr(self, step) is not None and getattr(self, needed) is None
+        ]
+        if lacking:
+            raise ValidationError("\n".join(lacking))
 
     def to_toml(self) -> str:
         """Return the pipeline as TOML text with every parameter; `loads` gives back an equal pipeline."""

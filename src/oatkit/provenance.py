@@ -20,7 +20,7 @@ def versions(pipeline: Pipeline) -> dict[str, str]:
 
 
 def _plugins(pipeline: Pipeline) -> list[Plugin]:
-    slots = (pipeline.forward, pipeline.reconstruct, pipeline.segment, pipeline.unmix)
+    slots = (pipeline.forward, pipeline.reconstruct, pipeline.segment, pipeline.fluence, pipeline.unmix)
     return [*pipeline.preprocess, *(step for step in slots if step is not None)]
 
 

@@ -18,6 +18,9 @@ from oatkit.metrics import negative_pixels
 from oatkit.pipeline import Pipeline
 from oatkit.vectors import norm
 
+DEFINED_EVERYWHERE = ("initial_pressure", "boundary", "fluence")
+"""Images without undefined pixels."""
+
 
 def preprocess(pipeline: Pipeline, scan: Scan, frame: int, memo: Memo | None = None) -> Scan:
     """Return one frame after all steps of ``preprocess``, checked to be finite and seen by the grid."""
@@ -58,7 +61,7 @@ def reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iter
     with np.errstate(over="ignore"):
         values = np.stack([state.image for state in last]).astype(np.float32)
     made = Image(values, "initial_pressure", "a.u.", grid, clean.wavelengths_nm, history_of(pipeline))
-    check_finite(solver, "initial_pressure", made)
+    check_finite(f"solver '{solver.name}'", "initial_pressure", made)
     yield {"initial_pressure": replace(made, diagnostics=_diagnose(values, last, norms))}
 
 
@@ -71,12 +74,11 @@ def _checked_iterate(solver: Solver, state: Iterate | None, problem: Problem) ->
     return state
 
 
-def check_finite(plugin: Plugin, name: str, image: Image) -> None:
-    """Raise `SolverError` for infinite pixels, and for NaN where every pixel has a value: in the initial pressure."""
-    wrong = ~np.isfinite(image.values) if name == "initial_pressure" else np.isinf(image.values)
+def check_finite(who: str, name: str, image: Image) -> None:
+    """Raise `SolverError` for infinite pixels, and for NaN in an image that has a value everywhere."""
+    wrong = ~np.isfinite(image.values) if name in DEFINED_EVERYWHERE else np.isinf(image.values)
     if wrong.any():
-        kind = plugin.kind.replace("_", " ")
-        raise SolverError(f"{kind} '{plugin.name}' returned {wrong.sum()} pixels of '{name}' that are not finite")
+        raise SolverError(f"{who} returned {wrong.sum()} pixels of '{name}' that are not finite")
 
 
 def _diagnose(values: np.ndarray, last: list[Iterate], norms: list[float]) -> dict[str, Any]:

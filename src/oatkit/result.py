@@ -59,6 +59,8 @@ class Result(Mapping[str, Image]):
     """Which frame of the scan this is."""
     weight_choice: Mapping[str, Any] = field(default_factory=dict)
     """How a rule chose the weight; empty where the weight was given as a number."""
+    speed_choice: Mapping[str, Any] = field(default_factory=dict)
+    """How the speed of sound was found by focus; empty where it was not."""
     stored: Frames | None = None
     """The folder that the result was loaded from."""
 

@@ -104,6 +104,7 @@ class Store:
             warnings=record.warnings if record else (),
             frame_index=record.frame_index if record else 0,
             weight_choice=manifest.weight_choice,
+            speed_choice=manifest.speed_choice,
             stored=stored,
         )
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from oatkit.data import Image
 from oatkit.result import Result
+from oatkit.words import counts_negatives, plane_words
 
 
 def summary(result: Result) -> Iterator[str]:
@@ -25,7 +26,9 @@ def image_lines(name: str, image: Image) -> Iterator[str]:
     for index, plane in enumerate(image.values):
         wavelength = f" at {image.wavelengths_nm[index]:g} nm" if image.wavelengths_nm else ""
         negative = int((plane < 0).sum())
-        parts = [f"{negative} of {plane.size} pixels negative ({100 * negative / plane.size:.1f} %)"]
+        parts = plane_words(image, index)
+        if counts_negatives(image):
+            parts.insert(0, f"{negative} of {plane.size} pixels negative ({100 * negative / plane.size:.1f} %)")
         if "products" in found:
             parts.append(f"{found['products'][index]} products")
             parts.append(

@@ -3,7 +3,7 @@
 One method per file, in a folder per kind. Nothing outside imports this package.
 """
 
-from oatkit.api import ForwardModel, Preprocessor, Reader, Regularizer, Solver, hookimpl
+from oatkit.api import FluenceModel, ForwardModel, Preprocessor, Reader, Regularizer, Segmenter, Solver, hookimpl
 
 
 @hookimpl
@@ -36,18 +36,41 @@ def oatkit_forward_models() -> list[type[ForwardModel]]:
 @hookimpl
 def oatkit_solvers() -> list[type[Solver]]:
     from oatkit.builtin.solvers.backprojection import Backprojection
+    from oatkit.builtin.solvers.l1 import L1Solver
     from oatkit.builtin.solvers.lsqr import Lsqr
     from oatkit.builtin.solvers.lsqr_threshold import LsqrThreshold
     from oatkit.builtin.solvers.maxent_nlcg import MaxEntNlcg
     from oatkit.builtin.solvers.nnls import Nnls
+    from oatkit.builtin.solvers.tv import TvSolver
 
-    return [Backprojection, Lsqr, LsqrThreshold, Nnls, MaxEntNlcg]
+    return [Backprojection, Lsqr, LsqrThreshold, Nnls, MaxEntNlcg, L1Solver, TvSolver]
 
 
 @hookimpl
 def oatkit_regularizers() -> list[type[Regularizer]]:
     from oatkit.builtin.regularizers.entropy import Entropy
     from oatkit.builtin.regularizers.identity import Identity
+    from oatkit.builtin.regularizers.l1 import L1
     from oatkit.builtin.regularizers.laplacian import Laplacian
+    from oatkit.builtin.regularizers.tv import TotalVariation
 
-    return [Entropy, Identity, Laplacian]
+    return [Entropy, Identity, Laplacian, L1, TotalVariation]
+
+
+@hookimpl
+def oatkit_fluence_models() -> list[type[FluenceModel]]:
+    from oatkit.builtin.fluence.beer_lambert import BeerLambert
+    from oatkit.builtin.fluence.diffusion_fvm import DiffusionFvm
+
+    return [BeerLambert, DiffusionFvm]
+
+
+@hookimpl
+def oatkit_segmenters() -> list[type[Segmenter]]:
+    from oatkit.builtin.segmenters.active_contour import ActiveContour
+    from oatkit.builtin.segmenters.geodesic import Geodesic
+    from oatkit.builtin.segmenters.mask import Mask
+    from oatkit.builtin.segmenters.polygon import Polygon
+    from oatkit.builtin.segmenters.radial import Radial
+
+    return [ActiveContour, Radial, Geodesic, Mask, Polygon]

@@ -114,10 +114,13 @@ class Anatomy:
 
     def depth(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return the radial distance below the outline, which is at most 1 from the origin."""
+        return self.reach(np.arctan2(y, x)) - np.hypot(y, x)
+
+    def reach(self, angle: np.ndarray) -> np.ndarray:
+        """Return how far the outline is from the origin in each direction, at most 1."""
         amplitude, phase = self.outline
-        angle = np.arctan2(y, x)
         bumps = sum(a * np.cos(k * angle + p) for k, a, p in zip(range(2, 6), amplitude, phase, strict=True))
-        return (1 + bumps) / (1 + amplitude.sum()) - np.hypot(y, x)
+        return (1 + bumps) / (1 + amplitude.sum())
 
     def _tissue(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return fat and fibroglandular tissue, more of the latter towards the middle, with their texture."""

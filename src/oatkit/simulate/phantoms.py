@@ -38,15 +38,19 @@ def star(grid: Grid, *, radius_m: float = 9e-3) -> Image:
     ours: the paper gives neither. Nothing lies further than `radius_m` from the origin.
     """
     check_radius(radius_m)
+    return _image(lambda y, x: star_density(y / radius_m, x / radius_m), grid)
 
-    def density(y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        y, x = y / radius_m, x / radius_m
-        angle = np.arctan2(y, x)
-        outline = 0.76 + 0.16 * np.sin(5 * angle) + 0.05 * np.cos(2 * angle + 0.7) + 0.03 * np.sin(3 * angle)
-        tubes = (np.hypot(y, x) <= 0.11) | (np.hypot(y - 0.68, x) <= 0.11)
-        return np.where(tubes, 2.5, np.where(np.hypot(y, x) <= outline, 0.25, 0.0))
 
-    return _image(density, grid)
+def star_outline(angle: np.ndarray) -> np.ndarray:
+    """Return how far the star reaches in each direction, relative to its `radius_m`."""
+    return 0.76 + 0.16 * np.sin(5 * angle) + 0.05 * np.cos(2 * angle + 0.7) + 0.03 * np.sin(3 * angle)
+
+
+def star_density(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return the star's value at points of the plane, their coordinates relative to its `radius_m`."""
+    tubes = (np.hypot(y, x) <= 0.11) | (np.hypot(y - 0.68, x) <= 0.11)
+    inside = np.hypot(y, x) <= star_outline(np.arctan2(y, x))
+    return np.where(tubes, 2.5, np.where(inside, 0.25, 0.0))
 
 
 def breast(grid: Grid, *, radius_m: float = 9e-3, seed: int = 0) -> Image:

@@ -1,0 +1,26 @@
+"""Least squares with total variation."""
+
+from typing import ClassVar
+
+from oatkit.api import Weight, param
+from oatkit.builtin.regularizers.analysis import Analysis
+from oatkit.builtin.regularizers.gradient import Gradient
+from oatkit.builtin.solvers.sparse import SparseSolver
+
+
+class TvSolver(SparseSolver):
+    """Least squares with total variation, min |A x - b|^2 + w TV(x), by FISTA with an inner iteration on the dual.
+
+    TV is that of the regularizer ``tv``. The image is the true minimiser under x >= 0. Convergence and relative gap are
+    as for `l1`.
+
+    References:
+        [Beck2009] Beck and Teboulle, IEEE Trans. Image Process. 18, 2419 (2009), 10.1109/TIP.2009.2028250.
+    """
+
+    name: ClassVar[str] = "tv"
+    weight: Weight = param(3e-3, "weight of the penalty, as `scaling` says", above=0)
+
+    def analysis(self) -> Analysis:
+        """Return the gradient."""
+        return Gradient()

@@ -1,0 +1,101 @@
+"""The tables of a pipeline file that are no plugins: scan, grid, optics, absorption."""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from oatkit.data import Grid, Optics, Scan
+from oatkit.optics import read_optics
+from oatkit.parameters import Parameters, param
+from oatkit.spectra import TISSUES, tissue_optics
+
+
+class ScanTable(Parameters):
+    """The table ``[scan]``: what is known better than the file says."""
+
+    speed_of_sound_m_s: float | Literal["focus"] | None = param(
+        None,
+        'speed of sound, in place of the file\'s; "focus" takes the one that gives the sharpest image',
+        unit="m/s",
+        at_least=300,
+        at_most=7000,
+    )
+    start_time_us: float | None = param(
+        None, "time of the first sample after the light pulse, in place of the file's", unit="us"
+    )
+
+    def apply(self, scan: Scan) -> Scan:
+        """Return the scan with its values overridden; a speed of sound that is still a rule is left alone."""
+        if isinstance(self.speed_of_sound_m_s, float | int):
+            scan = scan.with_speed_of_sound(self.speed_of_sound_m_s, "pipeline")
+        if self.start_time_us is not None:
+            scan = scan.with_start_time(self.start_time_us * 1e-6)
+        return scan
+
+
+class GridTable(Parameters):
+    """The table ``[grid]``: the square image to reconstruct."""
+
+    pixels: int = param(200, "pixels along each side", at_least=2, at_most=8192)
+    field_of_view_mm: float = param(25.0, "length of each side", unit="mm", above=0)
+    centre_mm: tuple[float, float] = param((0.0, 0.0), "middle of the image, (y, x)", unit="mm")
+
+    def grid(self) -> Grid:
+        """Return the grid in SI units. Raises `ValidationError` for pixels of an impossible size."""
+        y, x = self.centre_mm
+        return Grid((self.pixels, self.pixels), self.field_of_view_mm * 1e-3 / self.pixels, (y * 1e-3, x * 1e-3))
+
+
+class OpticsTable(Parameters):
+    """The table ``[optics]``: how the body absorbs and scatters light, as the fluence model is told.
+
+    A number holds at every wavelength and takes the place of the tissue's or the file's value.
+    """
+
+    tissue: Literal[tuple(TISSUES)] = param("soft-tissue", "preset of the tissue")  # type: ignore[valid-type]
+    table: Path | None = param(
+        None,
+        "CSV file in place of a preset, with the columns wavelength_nm, absorption_per_cm, reduced_scattering_per_cm",
+    )
+    absorption_per_cm: float | None = param(None, "mu_a of the body at every wavelength", unit="1/cm", above=0)
+    reduced_scattering_per_cm: float | None = param(None, "mu_s' of the body at every wavelength", unit="1/cm", above=0)
+
+    def optics(self, wavelengths_nm: tuple[float, ...]) -> Optics:
+        """Return the properties in SI units. Raises `ReadError` for the file and `ValidationError` out of its range."""
+        given = (self.absorption_per_cm, self.reduced_scattering_per_cm)
+        if None in given:
+            known = read_optics(self.table, wavelengths_nm) if self.table else self._of_tissue(wavelengths_nm)
+            tabulated = [known.absorption_per_m, known.reduced_scattering_per_m]
+        else:
+            tabulated = [np.zeros(0)] * 2
+        columns = [
+            values if number is None else np.full(len(wavelengths_nm), 100 * number)
+            for number, values in zip(given, tabulated, strict=True)
+        ]
+        return Optics(wavelengths_nm, *columns)
+
+    def _of_tissue(self, wavelengths_nm: tuple[float, ...]) -> Optics:
+        return tissue_optics(self.tissue, wavelengths_nm)
+
+
+class AbsorptionTable(Parameters):
+    """The table ``[absorption]``: from initial pressure and fluence to the absorption coefficient."""
+
+    calibration: float | None = param(
+        None,
+        "K: signal that 1/m of absorption gives at fluence 1 and Grueneisen parameter 1; without it absorption is in "
+        "arbitrary units",
+        unit="a.u. m",
+        above=0,
+    )
+    grueneisen: float = param(1.0, "Grueneisen parameter of the body; 1 leaves it in the calibration", above=0)
+    passes: int = param(
+        1,
+        "passes between absorption and light: 1 takes the light of a homogeneous body, more feed the absorption back",
+        at_least=1,
+        at_most=100,
+    )
+    floor: float = param(
+        0.02, "least fluence that is divided by, relative to the largest in the body", above=0, at_most=1
+    )
