@@ -25,7 +25,7 @@ def images(seed: int = 0) -> tuple[Image, Image, Image]:
 
 
 def test_a_known_absorption_comes_back():
-    """The pressure that mu_a makes with known K, Gamma and Phi gives mu_a in 1/m inside, and NaN outside, to rounding."""
+    """The pressure that mu_a makes with known K, Gamma and Phi gives mu_a in 1/m inside, NaN outside."""
     _, fluence, boundary = images()
     mu_a = np.random.default_rng(1).uniform(10, 300, fluence.values.shape)
     pressure = Image(7.0 * 0.2 * mu_a * fluence.values, "initial_pressure", "a.u.", GRID, WAVELENGTHS_NM)

@@ -15,7 +15,7 @@ import oatkit
 from packages import run_oatkit
 
 SMALL = ("--set", "grid.pixels=32", "--set", "grid.field_of_view_mm=9")
-COMMANDS = ("demo", "info", "run", "pipeline", "plugins", "describe", "simulate", "export", "verify")
+COMMANDS = ("demo", "paper", "info", "run", "focus", "pipeline", "plugins", "describe", "simulate", "export", "verify")
 
 
 @pytest.fixture(scope="module")
