@@ -123,7 +123,7 @@ def test_a_sweep_knows_its_best_weight():
     found = sweep(L2, star.problem, 1, star.truth[0].values[0])
     assert found.scores[found.best] == max(found.scores)
     assert all(np.array(found.thresholded("").scores) >= np.array(found.scores))
-    assert found.weights == L2.weights(1) == pytest.approx([1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+    assert found.weights == L2.weights(1) == pytest.approx([1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1])
     assert MAXENT.solver().name == "maxent-nlcg"
 
 

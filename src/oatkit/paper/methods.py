@@ -32,11 +32,11 @@ class Method:
         return made
 
 
-L2 = Method("L2", "lsqr", (1e-6, 1e-2))
-L2_THRESHOLD = Method("L2, thresholded", "lsqr-threshold", (1e-6, 1e-2))
-NNLS = Method("L2, x ≥ 0", "nnls", (1e-6, 1e-2), {"tolerance": 3e-4})
+L2 = Method("L2", "lsqr", (1e-6, 1e-1))
+L2_THRESHOLD = Method("L2, thresholded", "lsqr-threshold", (1e-6, 1e-1))
+NNLS = Method("L2, x ≥ 0", "nnls", (1e-6, 1e-1), {"tolerance": 3e-4})
 MAXENT = Method("MaxEnt, structural prior", "maxent-nlcg")
-MAXENT_FLAT = Method("MaxEnt, flat prior", "maxent-nlcg", (1e-5, 1e-2), {"prior": 0.01})
-L1 = Method("L1, x ≥ 0", "l1", (1e-5, 1e-2))
+MAXENT_FLAT = Method("MaxEnt, flat prior", "maxent-nlcg", parameters={"prior": 0.01})
+L1 = Method("L1, x ≥ 0", "l1")
 TV = Method("TV, x ≥ 0", "tv")
 BACKPROJECTION = Method("back-projection", "backprojection")
