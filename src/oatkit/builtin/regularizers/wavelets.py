@@ -31,7 +31,7 @@ class Wavelets(Analysis):
         out = np.array(image, dtype=float)[None]
         for ny, nx in self._shapes(image.shape):
             coarse, (y, x, both) = self._pywt.dwt2(out[0, :ny, :nx], self._filters, mode="periodization")
-            out[0, :ny, :nx] = np.block([[coarse, y], [x, both]])
+            out[0, :ny, :nx] = np.block([[coarse, x], [y, both]])
         return out
 
     def adjoint(self, coefficients: np.ndarray) -> np.ndarray:
@@ -39,7 +39,7 @@ class Wavelets(Analysis):
         out = np.array(coefficients[0])
         for ny, nx in reversed(self._shapes(out.shape)):
             upper, lower = (np.hsplit(half, 2) for half in np.vsplit(out[:ny, :nx], 2))
-            bands = upper[0], (upper[1], *lower)
+            bands = upper[0], (lower[0], upper[1], lower[1])
             out[:ny, :nx] = self._pywt.idwt2(bands, self._filters, mode="periodization")
         return out
 

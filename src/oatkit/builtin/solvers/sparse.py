@@ -65,7 +65,8 @@ class _Best:
     def see(self, step: Step) -> None:
         """Look at another step."""
         self.bound = max(self.bound, step.point.bound(step.dual))
-        if step.point.value < self.point.value:
+        # Near the optimum P no longer tells two images apart, and the later one is nearer.
+        if step.point.value <= self.point.value * (1 + ROUNDING):
             self.point = step.point
 
     @property
