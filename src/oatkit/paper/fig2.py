@@ -141,5 +141,6 @@ def _notes() -> tuple[str, ...]:
         '"Light of agar alone" is the same phantom simulated without these shadows: what the correction assumes is '
         "then true.",
         f'"Fed back" takes {PASSES} passes: the absorption found dims the light of the next pass. It needs the '
-        "calibration, which is known here and seldom is for a scanner.",
+        "calibration, which is known here and seldom is for a scanner, and it amplifies what is wrong in the "
+        "reconstruction.",
     )
