@@ -14,7 +14,7 @@ SOURCE = Path(oatkit.__file__).parent
 HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg", "h5py", "skimage", "tifffile", "typer")
 
 ORDER = [
-    {"errors", "names", "vectors", "laplacian"},
+    {"errors", "names", "vectors", "laplacian", "compiled"},
     {"content", "atomic", "threads", "plain", "page", "hostile", "focus_metrics"},
     {"data", "plot"},
     {"parameters", "checked", "metrics", "optics", "polygons", "scale", "scanfile", "spectra", "words"},
@@ -39,8 +39,8 @@ UPWARDS = {("result", "store")}
 """The one exception: `Result.save` is promised, and imports the store when it is called."""
 
 FOR_BUILTINS = {
-    "api", "content", "data", "errors", "hostile", "laplacian", "masking", "polygons", "scanfile", "spectra",
-    "threads", "vectors",
+    "api", "compiled", "content", "data", "errors", "hostile", "laplacian", "masking", "polygons", "scanfile",
+    "spectra", "threads", "vectors",
 }  # fmt: skip
 
 

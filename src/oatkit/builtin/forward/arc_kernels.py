@@ -5,24 +5,10 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 
-# Without the numpy error model every division is guarded by a branch and the loops are not vectorised. NaN keeps its
-# meaning: images may hold it.
-OPTIONS: dict[str, Any] = {
-    "nogil": True,
-    "error_model": "numpy",
-    "fastmath": {"reassoc", "contract", "arcp", "nsz", "afn"},
-}
-
-
-def fast(function: Callable[..., Any]) -> Any:
-    """Compile a kernel, and keep the machine code where there is a folder to keep it in."""
-    try:
-        return njit(cache=True, **OPTIONS)(function)
-    except RuntimeError:
-        return njit(**OPTIONS)(function)
+from oatkit.compiled import fast
 
 
 def _quad(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:

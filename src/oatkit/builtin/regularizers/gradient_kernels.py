@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from oatkit.builtin.forward.arc_kernels import fast
+from oatkit.compiled import fast
 
 
 @fast
