@@ -179,3 +179,40 @@ def test_ctrl_c_ends_a_run_and_leaves_nothing(small_scan_file, tmp_path):
     assert "interrupted" in errors
     assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == []
+
+
+def test_focus_prints_the_pick_and_what_the_scan_says(small_scan_file, tmp_path):
+    """`focus --json` holds pick, header and curves and draws its figure; half a range is a usage error."""
+    figure = tmp_path / "focus.png"
+    arguments = ("focus", str(small_scan_file), *SMALL, "--lowest", "1450", "--highest", "1550")
+    done = run_oatkit(*arguments, "--json", "-o", str(figure))
+    assert done.returncode == 0, done.stderr
+    table = json.loads(done.stdout)
+    assert table["header_m_s"] == 1500.0
+    assert abs(table["speed_m_s"] - 1500.0) < 15
+    assert len(table["scores"]["variance"]) == len(table["speeds_m_s"])
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    text = run_oatkit(*arguments).stdout
+    assert text.startswith(f"speed of sound      {table['speed_m_s']:.1f} m/s by focus (variance)")
+    assert run_oatkit(*arguments[:-2]).returncode == 2
+
+
+def test_paper_lists_its_experiments_and_refuses_others(tmp_path):
+    """`paper` without a name lists all experiments; an unknown one is a usage error that names the nearest."""
+    listed = run_oatkit("paper").stdout
+    assert all(name in listed for name in ("fig1", "fig2", "fig6", "figS1", "table1", "ranking"))
+    done = run_oatkit("paper", "fig11", "-o", str(tmp_path / "out"))
+    assert done.returncode == 2
+    assert "did you mean 'fig1'" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_run_says_what_the_chain_found(small_scan_file, tmp_path):
+    """`run` with a preset that goes on to the absorption reports body, light and that the scale is not known."""
+    out = tmp_path / "out.zarr"
+    ring = ("--set", "fluence.ring_radius=14")
+    done = run_oatkit("run", "lsqr-threshold-absorption", str(small_scan_file), "-o", str(out), *SMALL, *ring)
+    assert done.returncode == 0, done.stderr
+    assert "boundary: a body of " in done.stdout
+    assert "of the incident light" in done.stdout
+    assert "in arbitrary units: no calibration" in done.stdout
