@@ -68,7 +68,7 @@ def _lines(image: Image, index: int) -> Iterator[str]:
     plane, found = image.values[index], image.diagnostics
     negative = int((plane < 0).sum())
     if counts_negatives(image):
-        share = 100 * negative / plane.size
+        share = 100 * negative / max(1, int(np.isfinite(plane).sum()))
         yield f"{negative:,} negative pixel{'s' * (negative > 1)} ({share:.1f} %)" if negative else "no negative pixels"
     yield from plane_words(image, index)
     gap = _of_wavelength(found.get("relative_gap"), index)

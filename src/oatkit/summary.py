@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from oatkit.data import Image
 from oatkit.result import Result
 from oatkit.words import counts_negatives, plane_words
@@ -28,7 +30,8 @@ def image_lines(name: str, image: Image) -> Iterator[str]:
         negative = int((plane < 0).sum())
         parts = plane_words(image, index)
         if counts_negatives(image):
-            parts.insert(0, f"{negative} of {plane.size} pixels negative ({100 * negative / plane.size:.1f} %)")
+            defined = max(1, int(np.isfinite(plane).sum()))
+            parts.insert(0, f"{negative} of {defined} pixels negative ({100 * negative / defined:.1f} %)")
         if "products" in found:
             parts.append(f"{found['products'][index]} products")
             parts.append(
