@@ -18,7 +18,7 @@ ORDER = [
     {"content", "atomic", "threads", "plain", "page", "hostile", "focus_metrics"},
     {"data", "plot"},
     {"parameters", "checked", "metrics", "optics", "polygons", "scale", "scanfile", "spectra", "words"},
-    {"problem", "masking", "tables"},
+    {"problem", "masking", "outlines", "tables"},
     {"absorption", "api"},
     {"blame", "events", "fixed_point", "hookspecs", "simulate"},
     {"registry", "weights"},

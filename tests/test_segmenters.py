@@ -6,13 +6,12 @@ from itertools import product
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
-from scipy.spatial import cKDTree
 
 import oatkit
 from oatkit.api import FluenceModel, Grid, Image, ReadError, SolverError, ValidationError
 from oatkit.builtin.segmenters.closed_path import cheapest_closed_path
 from oatkit.builtin.segmenters.contours import smoothed
-from oatkit.polygons import resampled
+from oatkit.outlines import dice, hausdorff_m
 from oatkit.simulate import disc_body, mouse_body, simulate_scan, star_body
 
 GRID = Grid((200, 200), 125e-6)
@@ -54,23 +53,6 @@ def pressure_image(values, grid=GRID, **more):
     return Image(np.asarray(values, float), "initial_pressure", "Pa", grid, **more)
 
 
-def dice(boundary, body):
-    """Overlap of the inside with that of the true body."""
-    found, true = boundary.values[0] < 0, body.boundary(boundary.grid).values[0] < 0
-    return 2 * (found & true).sum() / (found.sum() + true.sum())
-
-
-def hausdorff_m(boundary, body):
-    """Largest distance of either contour from the other one, m; the found one is the zero of the boundary image."""
-    from skimage.measure import find_contours
-
-    grid = boundary.grid
-    curves = [grid.pixel_size_m * curve for curve in find_contours(boundary.values[0], 0.0)]
-    found = np.array([grid.y_m[0], grid.x_m[0]]) + np.vstack([resampled(curve[:-1], 2e-5) for curve in curves])
-    true = resampled(body.outline_m, 2e-5)
-    return max(cKDTree(found).query(true)[0].max(), cKDTree(true).query(found)[0].max())
-
-
 BODIES = {
     "disc": disc_body, "off-centre disc": lambda: disc_body(5e-3, (3e-3, -4e-3)), "star": star_body,
     "mouse": mouse_body, "another mouse": lambda: mouse_body(7),
@@ -86,8 +68,8 @@ def test_a_body_is_found(kind, name):
     """
     body = BODIES[kind]()
     boundary = segmenter(name).segment(picture(body))
-    assert dice(boundary, body) >= 0.99
-    assert hausdorff_m(boundary, body) <= (0.7e-3 if (kind, name) == ("star", "geodesic") else 0.25e-3)
+    assert dice(boundary, body.boundary(boundary.grid)) >= 0.99
+    assert hausdorff_m(boundary, body.outline_m) <= (0.7e-3 if (kind, name) == ("star", "geodesic") else 0.25e-3)
     true_area = (body.boundary(GRID).values < 0).sum() * 0.125**2
     assert boundary.diagnostics["area_mm2"] == pytest.approx(true_area, rel=0.01)
     assert boundary.diagnostics["notes"] == ()
@@ -108,9 +90,9 @@ def test_legs_are_entered_where_the_radial_path_bridges_them(name):
     """The hollows beside the legs are found to 0.3 mm; the radial path is off by more than 1 mm there and says so."""
     body = mouse_body(2, legs=True)
     image = picture(body)
-    assert hausdorff_m(segmenter(name).segment(image), body) <= 0.3e-3
+    assert hausdorff_m(segmenter(name).segment(image), body.outline_m) <= 0.3e-3
     bridged = segmenter("radial").segment(image)
-    assert hausdorff_m(bridged, body) > 1e-3
+    assert hausdorff_m(bridged, body.outline_m) > 1e-3
     assert "try the segmenter 'active-contour' or 'geodesic'" in bridged.diagnostics["notes"][0]
 
 
@@ -141,7 +123,7 @@ def test_where_the_snake_strays_the_radial_path_is_kept():
     radial = segmenter("radial", rigidity=0.3).segment(image)
     assert (snake.values == radial.values).all()
     assert "the radial path that it started from is returned" in snake.diagnostics["notes"][0]
-    assert dice(snake, disc_body()) >= 0.99
+    assert dice(snake, disc_body().boundary(snake.grid)) >= 0.99
 
 
 @pytest.mark.parametrize("name", FINDERS)
@@ -170,7 +152,7 @@ def test_a_body_that_is_cut_is_closed_along_the_edge(name):
     """The note says so, and inside the field of view the body is found with a Dice of 0.99."""
     body = disc_body(9e-3, (6e-3, 2e-3))
     boundary = segmenter(name).segment(picture(body))
-    assert dice(boundary, body) >= 0.99
+    assert dice(boundary, body.boundary(boundary.grid)) >= 0.99
     assert any("cut by the field of view" in note for note in boundary.diagnostics["notes"])
 
 
@@ -179,7 +161,7 @@ def test_a_tiny_body_is_found_and_doubted():
     body = disc_body(1e-3, (4e-3, 2e-3))
     sharp = gaussian_filter((body.boundary(GRID).values[0] < 0).astype(float), 1.0)
     boundary = segmenter("radial").segment(pressure_image(sharp))
-    assert hausdorff_m(boundary, body) <= 0.1e-3
+    assert hausdorff_m(boundary, body.outline_m) <= 0.1e-3
     assert any("implausibly small: 3." in note for note in boundary.diagnostics["notes"])
 
 
@@ -284,7 +266,7 @@ class TestMask:
         """Row 0 is at the bottom in .npy files and at the top in pictures; the outline is found to 0.05 mm."""
         drawn = self.labels() if name.endswith("npy") else self.labels()[::-1]
         boundary = segmenter("mask", path=write_mask(tmp_path / name, drawn), label=2).segment(self.blank)
-        assert hausdorff_m(boundary, self.body) <= 0.05e-3
+        assert hausdorff_m(boundary, self.body.outline_m) <= 0.05e-3
         assert boundary.diagnostics["notes"] == ()
 
     def test_the_first_row_can_be_stated(self, tmp_path):
@@ -294,14 +276,14 @@ class TestMask:
             segmenter("mask", path=path, label=2, row_0=r).segment(self.blank).values for r in ("bottom", "top")
         )
         assert up[:, ::-1] == pytest.approx(down, abs=1e-9)
-        assert dice(pressure_image(up), self.body) >= 0.99
+        assert dice(pressure_image(up), self.body.boundary(GRID)) >= 0.99
 
     def test_without_a_label_the_largest_piece_is_taken(self, tmp_path):
         """All labels count, the spot in the corner is left out, and a hole is filled."""
         labels = self.labels()
         labels[120:124, 80:84] = 0
         boundary = segmenter("mask", path=write_mask(tmp_path / "m.npy", labels)).segment(self.blank)
-        assert dice(boundary, self.body) >= 0.995
+        assert dice(boundary, self.body.boundary(boundary.grid)) >= 0.995
 
     def test_many_pieces_are_mentioned(self, tmp_path):
         """Where more than 1 % of the area is left out, a note says how much."""
@@ -315,7 +297,7 @@ class TestMask:
         fine = Grid((601, 601), 25e-3 / 601)
         path = write_mask(tmp_path / "m.npy", self.labels(fine))
         boundary = segmenter("mask", path=path, label=2).segment(self.blank)
-        assert hausdorff_m(boundary, self.body) <= 0.02e-3
+        assert hausdorff_m(boundary, self.body.outline_m) <= 0.02e-3
 
     def test_another_aspect_is_refused(self, tmp_path):
         """The message names both shapes."""
@@ -380,5 +362,5 @@ def test_bodies_are_found_in_reconstructions_at_3_db():
             image = oatkit.run(oatkit.Pipeline.load(preset), scan)["initial_pressure"]
             for name in FINDERS:
                 boundary = segmenter(name).segment(image)
-                assert dice(boundary, body) >= 0.97, (body.name, preset, name)
-                assert hausdorff_m(boundary, body) <= 0.5e-3, (body.name, preset, name)
+                assert dice(boundary, body.boundary(boundary.grid)) >= 0.97, (body.name, preset, name)
+                assert hausdorff_m(boundary, body.outline_m) <= 0.5e-3, (body.name, preset, name)
