@@ -127,6 +127,19 @@ def test_only_what_follows_a_change_runs_again(small_scan, change, expected):
     assert expected == CALLS
 
 
+def test_a_mask_that_was_redrawn_is_read_again(small_scan, tmp_path):
+    """With one memo, another mask under the same name gives another outline."""
+    memo, path = Memo(), tmp_path / "mask.npy"
+    areas = []
+    for size in (8, 16):
+        mask = np.zeros((32, 32), np.uint8)
+        mask[8 : 8 + size, 8 : 8 + size] = 1
+        np.save(path, mask)
+        drawn = Pipeline.load("lsqr", (*SMALL, "segment.use=mask", f"segment.path={path}"))
+        areas.append((run(drawn, small_scan, memo=memo)["boundary"].values < 0).sum())
+    assert areas[1] == pytest.approx(4 * areas[0], rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("parts", "error", "sentence"),
     [

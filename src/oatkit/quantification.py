@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from oatkit.absorption import absorption
@@ -18,12 +19,22 @@ from oatkit.reconstruction import check_finite
 Images = Mapping[str, Image]
 
 
-def following(pipeline: Pipeline) -> Iterator[tuple[str, tuple[Parameters, ...]]]:
-    """Yield the name of each step of `pipeline`, in order, with the parameters that it adds to those before."""
+def following(pipeline: Pipeline) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """Yield the name of each step of `pipeline`, in order, with all that its images depend on beyond those before."""
     for name in STEPS:
         part = getattr(pipeline, name)
         if part is not None:
-            yield name, (part, pipeline.optics) if name == "fluence" else (part,)
+            parts = (part, pipeline.optics) if name == "fluence" else (part,)
+            yield name, (*parts, *(stamp for part in parts for stamp in _stamps(part)))
+
+
+def _stamps(part: Parameters) -> Iterator[tuple[str, int, int]]:
+    """Yield what tells whether a file that a step reads has been changed: a mask is redrawn under one name."""
+    for name in type(part).model_fields:
+        path = getattr(part, name)
+        if isinstance(path, Path) and path.is_file():
+            status = path.stat()
+            yield str(path), status.st_mtime_ns, status.st_size
 
 
 def quantify(name: str, pipeline: Pipeline, images: Images) -> dict[str, Image]:
