@@ -254,7 +254,7 @@ def pipeline(
         typer.echo(preset(preset_name), nl=False)
         return
     for name, text in presets().items():
-        typer.echo(f"{name:<16}{text.splitlines()[0].lstrip('# ')}")
+        typer.echo(f"{name:<28}{text.splitlines()[0].lstrip('# ')}")
 
 
 @command
