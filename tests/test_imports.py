@@ -16,9 +16,9 @@ HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg",
 ORDER = [
     {"errors", "names", "vectors", "laplacian", "compiled"},
     {"content", "atomic", "threads", "plain", "page", "hostile", "focus_metrics"},
-    {"data", "plot"},
+    {"csv_table", "data", "plot"},
     {"parameters", "checked", "metrics", "optics", "polygons", "scale", "scanfile", "spectra", "words"},
-    {"problem", "masking", "outlines", "tables"},
+    {"problem", "masking", "outlines", "regions", "tables"},
     {"absorption", "api"},
     {"blame", "events", "fixed_point", "hookspecs", "simulate"},
     {"registry", "weights"},
@@ -28,7 +28,7 @@ ORDER = [
     {"store_writer", "figure", "reconstruction"},
     {"quantification", "focus"},
     {"rules"},
-    {"store", "engine", "describe", "focus_figure"},
+    {"store", "engine", "describe", "focus_figure", "spectra_figure"},
     {"batch", "export", "summary", "progress"},
     {"demo", "paper"},
     {"cli"},
@@ -39,8 +39,8 @@ UPWARDS = {("result", "store")}
 """The one exception: `Result.save` is promised, and imports the store when it is called."""
 
 FOR_BUILTINS = {
-    "api", "compiled", "content", "data", "errors", "hostile", "laplacian", "masking", "polygons", "scanfile",
-    "spectra", "threads", "vectors",
+    "api", "compiled", "content", "data", "errors", "hostile", "laplacian", "masking", "parameters",
+    "polygons", "regions", "scanfile", "spectra", "threads", "vectors",
 }  # fmt: skip
 
 

@@ -91,12 +91,16 @@ def _describe(annotation: Any, bounds: Bounds) -> str:
         count = "a list of" if Ellipsis in args else f"a list of {len(args)}"
         if isinstance(args[0], type) and issubclass(args[0], Parameters):
             return f"{count} {_called(args[0])}s"
-        return f"{count} {'whole ' if args[0] is int else ''}numbers{limits}"
+        return f"{count} {ITEMS.get(args[0], 'values')}{limits}"
     if isinstance(annotation, type) and issubclass(annotation, Parameters):
         return f"a {_called(annotation)}"
     words = {bool: "true or false", str: "a text", Path: "a path"}
     numbers = {float: "a number", int: "a whole number"}
     return words.get(annotation) or numbers.get(annotation, str(annotation)) + limits
+
+
+ITEMS: Mapping[Any, str] = {float: "numbers", int: "whole numbers", str: "texts", Path: "paths"}
+"""What a message calls the items of a list."""
 
 
 def _called(cls: "type[Parameters]") -> str:
@@ -173,8 +177,8 @@ class Parameters(BaseModel, metaclass=_OurErrors):
             value = _part(ability, field.default, value, context)
         elif ability and isinstance(value, tuple):
             value = _parts(ability, value, context)
-        elif Path in (field.annotation, *get_args(field.annotation)) and isinstance(value, str):
-            value = (context.folder if context else Path()) / value
+        elif Path in (field.annotation, *get_args(field.annotation)):
+            value = _as_paths(value, context.folder if context else Path())
         try:
             checked = handler(value)
         except pydantic.ValidationError:
@@ -196,6 +200,13 @@ class Parameters(BaseModel, metaclass=_OurErrors):
 
 def _as_tuples(value: Any) -> Any:
     return tuple(_as_tuples(item) for item in value) if isinstance(value, list | tuple) else value
+
+
+def _as_paths(value: Any, folder: Path) -> Any:
+    """Return a text, or each text of a list, as a path from `folder`."""
+    if isinstance(value, tuple):
+        return tuple(_as_paths(item, folder) for item in value)
+    return folder / value if isinstance(value, str) else value
 
 
 def _numbers(value: Any) -> Iterator[float]:

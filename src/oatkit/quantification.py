@@ -15,6 +15,7 @@ from oatkit.fixed_point import fixed_point
 from oatkit.parameters import Parameters
 from oatkit.pipeline import Pipeline
 from oatkit.reconstruction import check_finite
+from oatkit.tables import AbsorptionTable
 
 Images = Mapping[str, Image]
 
@@ -31,10 +32,11 @@ def following(pipeline: Pipeline) -> Iterator[tuple[str, tuple[Any, ...]]]:
 def _stamps(part: Parameters) -> Iterator[tuple[str, int, int]]:
     """Yield what tells whether a file that a step reads has been changed: a mask is redrawn under one name."""
     for name in type(part).model_fields:
-        path = getattr(part, name)
-        if isinstance(path, Path) and path.is_file():
-            status = path.stat()
-            yield str(path), status.st_mtime_ns, status.st_size
+        value = getattr(part, name)
+        for path in value if isinstance(value, tuple) else (value,):
+            if isinstance(path, Path) and path.is_file():
+                status = path.stat()
+                yield str(path), status.st_mtime_ns, status.st_size
 
 
 def quantify(name: str, pipeline: Pipeline, images: Images) -> dict[str, Image]:
@@ -75,8 +77,16 @@ def _absorption(pipeline: Pipeline, images: Images) -> Images:
 
 def _unmix(pipeline: Pipeline, images: Images) -> Images:
     assert pipeline.unmix is not None
+    pressure, table = images["initial_pressure"], pipeline.absorption or AbsorptionTable()
     problem = UnmixProblem(
-        images["initial_pressure"], images.get("absorption"), images.get("boundary"), pipeline.fluence
+        pressure,
+        images.get("absorption"),
+        images.get("boundary"),
+        images.get("fluence"),
+        pipeline.fluence,
+        pipeline.optics.optics(pressure.wavelengths_nm) if pipeline.fluence else None,
+        None if table.calibration is None else table.calibration * table.grueneisen,
+        table.floor,
     )
     return pipeline.unmix.unmix(problem)
 

@@ -3,7 +3,17 @@
 One method per file, in a folder per kind. Nothing outside imports this package.
 """
 
-from oatkit.api import FluenceModel, ForwardModel, Preprocessor, Reader, Regularizer, Segmenter, Solver, hookimpl
+from oatkit.api import (
+    FluenceModel,
+    ForwardModel,
+    Preprocessor,
+    Reader,
+    Regularizer,
+    Segmenter,
+    Solver,
+    Unmixer,
+    hookimpl,
+)
 
 
 @hookimpl
@@ -74,3 +84,11 @@ def oatkit_segmenters() -> list[type[Segmenter]]:
     from oatkit.builtin.segmenters.radial import Radial
 
     return [ActiveContour, Radial, Geodesic, Mask, Polygon]
+
+
+@hookimpl
+def oatkit_unmixers() -> list[type[Unmixer]]:
+    from oatkit.builtin.unmixers.lstsq import LstsqUnmixer
+    from oatkit.builtin.unmixers.nnls import NnlsUnmixer
+
+    return [NnlsUnmixer, LstsqUnmixer]

@@ -16,6 +16,8 @@ GRAM_PER_LITRE = 150.0
 """Haemoglobin in whole blood, [Jacques2013]_."""
 GRAM_PER_MOL = 64500.0
 """Molar mass of haemoglobin, as in Prahl's compilation."""
+MELANIN_RANGE_NM = (300.0, 1100.0)
+"""Where the power law for melanosomes is taken to hold."""
 
 
 def water_absorption_per_m(wavelengths_nm: Sequence[float] | np.ndarray, couplant: Couplant = "h2o") -> np.ndarray:
@@ -37,8 +39,17 @@ def haemoglobin_absorption_per_m(wavelengths_nm: Sequence[float] | np.ndarray) -
     Molar extinction compiled by S. Prahl, times ln(10) and 150 g/l over 64500 g/mol. Raises `ValidationError` for a
     wavelength out of the table's range.
     """
-    molar_per_cm = interpolated("haemoglobin_prahl.csv", wavelengths_nm)
-    return 100 * np.log(10) * molar_per_cm * GRAM_PER_LITRE / GRAM_PER_MOL
+    mol_per_m3 = 1000 * GRAM_PER_LITRE / GRAM_PER_MOL
+    return mol_per_m3 * haemoglobin_molar_absorption(wavelengths_nm)
+
+
+def haemoglobin_molar_absorption(wavelengths_nm: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return mu_a of 1 mol/m^3 of oxygenated and of deoxygenated haemoglobin, shape ``(2, wavelength)``, 1/m.
+
+    It is molar extinction compiled by S. Prahl, in 1/(cm M), times ln(10) * 100 / 1000. Raises `ValidationError` for a
+    wavelength out of the table's range.
+    """
+    return np.log(10) / 10 * interpolated("haemoglobin_prahl.csv", wavelengths_nm)
 
 
 def lipid_absorption_per_m(wavelengths_nm: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -49,17 +60,39 @@ def lipid_absorption_per_m(wavelengths_nm: Sequence[float] | np.ndarray) -> np.n
     return interpolated("lipid_van_veen.csv", wavelengths_nm)[0]
 
 
+def melanosome_absorption_per_m(wavelengths_nm: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return mu_a of the interior of a melanosome, 1.7e12 * (nm)^-3.48 1/cm [Jacques2013]_, in 1/m.
+
+    Raises `ValidationError` for a wavelength outside 300 .. 1100 nm, about which the formula says nothing.
+    """
+    wavelengths = np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))
+    _check_covered(wavelengths, *MELANIN_RANGE_NM, "the formula for melanin")
+    return 100 * 1.7e12 * wavelengths**-3.48
+
+
+def icg_relative_absorption(wavelengths_nm: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Return the absorption of indocyanine green relative to its largest, at 810 nm, shape ``(wavelength,)``.
+
+    Raises `ValidationError` for a wavelength out of the table's range.
+    """
+    return interpolated("icg.csv", wavelengths_nm)[0] / _read("icg.csv")[1].max()
+
+
 def interpolated(table: str, wavelengths_nm: Sequence[float] | np.ndarray) -> np.ndarray:
     """Return the columns of a table at some wavelengths, in any order, shape ``(column, wavelength)``."""
     known, *columns = _read(table)
     wanted = np.atleast_1d(np.asarray(wavelengths_nm, dtype=float))
-    covered = (wanted >= known[0]) & (wanted <= known[-1])
+    _check_covered(wanted, known[0], known[-1], table)
+    return np.array([np.interp(wanted, known, column) for column in columns])
+
+
+def _check_covered(wavelengths_nm: np.ndarray, lowest: float, highest: float, table: str) -> None:
+    covered = (wavelengths_nm >= lowest) & (wavelengths_nm <= highest)
     if not covered.all():
         raise ValidationError(
-            f"wavelength {wanted[~covered][0]:g} nm: {table} covers {known[0]:g} .. {known[-1]:g} nm; the unit is nm, "
-            "so 700e-9 m is 700"
+            f"wavelength {wavelengths_nm[~covered][0]:g} nm: {table} covers {lowest:g} .. {highest:g} nm; the unit is "
+            "nm, so 700e-9 m is 700"
         )
-    return np.array([np.interp(wanted, known, column) for column in columns])
 
 
 @cache

@@ -1,0 +1,1 @@
+"""Unmixers: from many wavelengths to chromophores."""
