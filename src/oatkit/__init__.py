@@ -13,7 +13,7 @@ from oatkit.engine import run, steps
 from oatkit.errors import OatkitError, PluginError, ReadError, ResultError, SolverError, ValidationError
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
-from oatkit.reading import read
+from oatkit.reading import read, read_images, read_regions
 from oatkit.registry import plugin
 from oatkit.result import Result
 from oatkit.store import load, verify
@@ -22,6 +22,6 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Detectors", "Geometry", "Grid", "Image", "Memo", "OatkitError", "Optics", "Pipeline", "PluginError", "ReadError",
-    "Result", "ResultError", "Scan", "SolverError", "ValidationError", "load", "plugin", "read", "run", "run_frames",
-    "steps", "verify",
+    "Result", "ResultError", "Scan", "SolverError", "ValidationError", "load", "plugin", "read", "read_images",
+    "read_regions", "run", "run_frames", "steps", "verify",
 ]  # fmt: skip

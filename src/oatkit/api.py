@@ -8,7 +8,7 @@ another plugin.
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -19,13 +19,15 @@ from oatkit.data import Detectors, Geometry, Grid, Image, Optics, Scan, Signals
 from oatkit.errors import OatkitError, PluginError, ReadError, SolverError, ValidationError
 from oatkit.parameters import Parameters, param
 from oatkit.problem import Iterate, Problem, UnmixProblem
+from oatkit.regions import EllipseRegion, PolygonRegion, RectangleRegion, Region
 from oatkit.scale import Reference
 
 __all__ = [
-    "KINDS", "Detectors", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image", "Iterate", "OatkitError",
-    "Optics", "Plugin", "PluginError", "Preprocessor", "Problem", "Proximable", "Quadratic", "ReadError",
-    "Reader", "Reference", "Regularizer", "Scan", "Segmenter", "Signals", "Smooth", "Solver", "SolverError",
-    "UnmixProblem", "Unmixer", "ValidationError", "Weight", "hookimpl", "param",
+    "KINDS", "Detectors", "EllipseRegion", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image", "Iterate",
+    "OatkitError", "Optics", "Plugin", "PluginError", "PolygonRegion", "Preprocessor", "Problem", "Proximable",
+    "Quadratic", "ReadError", "Reader", "RectangleRegion", "Reference", "Region", "Regularizer", "Scan", "Segmenter",
+    "Signals", "Smooth", "Solver", "SolverError", "UnmixProblem", "Unmixer", "ValidationError", "Weight", "hookimpl",
+    "param",
 ]  # fmt: skip
 
 hookimpl = pluggy.HookimplMarker("oatkit")
@@ -39,7 +41,7 @@ class Plugin(Parameters, ABC):
 
 
 class Reader(Plugin):
-    """Reads scans of one file format."""
+    """Reads scans of one file format, and what else such files hold: finished images, regions of interest."""
 
     kind: ClassVar[str] = "reader"
 
@@ -50,6 +52,17 @@ class Reader(Plugin):
     @abstractmethod
     def read(self, path: Path) -> Scan:
         """Return the scan in `path`, its signals lazily where the format allows. Raises `ReadError`."""
+
+    def images(self, path: Path) -> Mapping[str, Sequence[Image]]:
+        """Return the finished images in or beside `path` by name, each a sequence with one image for each frame.
+
+        A sequence reads an image when it is asked for it. Raises `ReadError`.
+        """
+        return {}
+
+    def regions(self, path: Path) -> tuple[Region, ...]:
+        """Return the regions of interest in or beside `path`. Raises `ReadError`."""
+        return ()
 
 
 class Preprocessor(Plugin):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from oatkit.checked import as_data, as_operator, as_product, as_shape, as_valid
-from oatkit.data import Geometry, Grid, Image
+from oatkit.data import Geometry, Grid, Image, Optics
 from oatkit.errors import SolverError, ValidationError
 from oatkit.scale import Reference, recall_norm, reference, remember_norm, returned, spectral_norm
 
@@ -174,9 +174,20 @@ class Iterate:
 
 @dataclass(frozen=True, eq=False)
 class UnmixProblem:
-    """What an unmixer gets: the images so far. The last three are there where the pipeline has them."""
+    """What an unmixer gets: the images so far, and what it needs to compute light anew.
+
+    All but the first are there where the pipeline has them.
+    """
 
     initial_pressure: Image
     absorption: Image | None = None
     boundary: Image | None = None
+    fluence: Image | None = None
     fluence_model: Any = None
+    """A `FluenceModel`."""
+    optics: Optics | None = None
+    """mu_a that one assumes of the body, and its mu_s', at the wavelengths of the images."""
+    calibration: float | None = None
+    """K Gamma: the signal that an absorption of 1/m gives at fluence 1, a.u. m; None where it is not known."""
+    floor: float = 0.02
+    """Least fluence that is divided by, relative to the largest in the body."""

@@ -1,10 +1,11 @@
-"""Reading a scan with whichever installed reader claims the file."""
+"""Reading a file with whichever installed reader claims it: its scan, finished images, regions of interest."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from oatkit.api import Reader
+from oatkit.api import Reader, Region
 from oatkit.blame import blame
-from oatkit.data import Scan
+from oatkit.data import Image, Scan
 from oatkit.errors import ReadError
 from oatkit.registry import installed
 
@@ -15,14 +16,28 @@ def read(path: str | Path, reader: Reader | None = None) -> Scan:
     Without `reader`, the one installed reader that claims the file. Raises `ReadError` where the file is missing,
     damaged, claimed by no reader, or claimed by several (it names them).
     """
-    path = Path(path)
-    if not _exists(path):
-        raise ReadError(f"{path}: no such file or folder")
-    with blame(reader := reader or _reader_of(path)):
-        return reader.read(path)
+    with blame(reader := reader or _reader_of(Path(path))):
+        return reader.read(Path(path))
+
+
+def read_images(path: str | Path, reader: Reader | None = None) -> Mapping[str, Sequence[Image]]:
+    """Return the finished images in or beside a file by name, each with one image for each frame, read when asked for.
+
+    Raises as `read` does.
+    """
+    with blame(reader := reader or _reader_of(Path(path))):
+        return reader.images(Path(path))
+
+
+def read_regions(path: str | Path, reader: Reader | None = None) -> tuple[Region, ...]:
+    """Return the regions of interest in or beside a file. Raises as `read` does."""
+    with blame(reader := reader or _reader_of(Path(path))):
+        return reader.regions(Path(path))
 
 
 def _reader_of(path: Path) -> Reader:
+    if not _exists(path):
+        raise ReadError(f"{path}: no such file or folder")
     readers = [make() for make in installed().of_kind("reader")]
     claiming, failed = [], []
     for reader in readers:

@@ -1,0 +1,22 @@
+"""The command line. Every command calls what a script would call.
+
+Exit codes: 0 done, 1 the result could not be written, 2 usage or invalid pipeline, 3 some frames failed,
+4 unreadable input, 130 interrupted.
+"""
+
+import signal
+
+# Each registers its commands, which --help lists in this order.
+# isort: off
+from oatkit.cli import showcase, scans, results, catalogue  # noqa: F401
+
+# isort: on
+from oatkit.cli.app import app, terminate
+
+
+def main() -> None:
+    """Run the command line; asked to end, by SIGTERM or a closed terminal, it cleans up behind itself."""
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), terminate)
+    app()

@@ -1,0 +1,97 @@
+"""What all commands share: how they are registered, their exit codes, and the arguments that they have in common."""
+
+import functools
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from oatkit.errors import OatkitError, PluginError, ReadError, ResultError, SolverError, ValidationError
+
+app = typer.Typer(
+    name="oatkit",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Optoacoustic tomography: from a scan to a non-negative image. "
+    "Start with `oatkit demo`, then `oatkit run maxent SCAN -o OUT.zarr` and `oatkit export OUT.zarr picture.png`.",
+)
+
+EXIT_CODES: dict[type[OatkitError], int] = {
+    ResultError: 1, ValidationError: 2, PluginError: 2, SolverError: 3, ReadError: 4,
+}  # fmt: skip
+INTERRUPTED = 130
+
+Command = Callable[..., Any]
+
+ScanPath = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SCAN", readable=False, help="The scan: a file that a reader knows (`oatkit plugins` lists them)."
+    ),
+]
+ResultPath = Annotated[Path, typer.Argument(metavar="OUT.zarr", help="A result that `oatkit run` has written.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
+Changes = Annotated[
+    list[str],
+    typer.Option("--set", metavar="SLOT.KEY=VALUE", help="Change the pipeline: reconstruct.weight=0.01. Repeatable."),
+]
+
+
+class Terminated(BaseException):
+    """A signal asked the command to end; its number is the text."""
+
+
+def terminate(number: int, frame: Any) -> None:
+    """Answer a signal by leaving every block that cleans up behind itself."""
+    raise Terminated(number)
+
+
+def command(function: Command) -> Command:
+    """Register a command whose errors become one sentence and an exit code."""
+
+    @functools.wraps(function)
+    def guarded(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return function(*args, **kwargs)
+        except OatkitError as error:
+            if os.environ.get("OATKIT_DEBUG"):
+                raise
+            complain(str(error))
+            raise typer.Exit(next((code for kind, code in EXIT_CODES.items() if isinstance(error, kind)), 1)) from None
+        except KeyboardInterrupt:
+            complain("interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+        except Terminated as signalled:
+            complain("terminated")
+            raise typer.Exit(128 + int(str(signalled))) from None
+        except BrokenPipeError:
+            # The reader of our output has gone (`oatkit info ... | head`): nothing is left to say.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(0) from None
+        except OSError as error:
+            if os.environ.get("OATKIT_DEBUG"):
+                raise
+            complain(str(error))
+            raise typer.Exit(1) from None
+
+    return app.command(name=function.__name__.removesuffix("_"))(guarded)
+
+
+def complain(text: str) -> None:
+    """Print to the error stream, one line for each of `text`, with the name of the program before it."""
+    for line in text.splitlines():
+        # Names from files must not steer the terminal.
+        shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in line)
+        typer.echo(f"oatkit: {shown}", err=True)
+
+
+def check_new(path: Path, overwrite: bool) -> None:
+    """Refuse, before any work is done, to write over what is there."""
+    if os.path.lexists(path) and not overwrite:
+        raise ValidationError(f"{path}: exists already; choose another name or add --overwrite")

@@ -1,0 +1,140 @@
+"""Commands on scans."""
+
+import json
+import time
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from oatkit.cli.app import AsJson, Changes, Overwrite, ScanPath, check_new, command
+from oatkit.errors import SolverError, ValidationError
+
+
+class Phantom(StrEnum):
+    """The phantoms of `oatkit simulate`."""
+
+    BREAST = "breast"
+    DISC = "disc"
+    STAR = "star"
+    VESSEL = "vessel"
+
+
+@command
+def info(scan: ScanPath, as_json: AsJson = False) -> None:
+    """Print what is in a scan file, and where its speed of sound came from."""
+    from oatkit.describe import scan_table, scan_text
+    from oatkit.reading import read
+
+    found = read(scan)
+    typer.echo(json.dumps(scan_table(found), indent=2, allow_nan=False) if as_json else scan_text(found))
+
+
+@command
+def run(
+    pipeline: Annotated[
+        str, typer.Argument(metavar="PIPELINE", help="A preset's name (maxent, lsqr, ...) or a .toml.")
+    ],
+    scan: ScanPath,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.zarr", help="The folder to write.")],
+    changes: Changes = [],  # noqa: B006 - typer wants a plain list
+    frames: Annotated[str, typer.Option(metavar="A:B", help="Which frames, as a Python slice, or one number.")] = ":",
+    overwrite: Overwrite = False,
+) -> None:
+    """Run a pipeline over a scan and write the images, with how they came about, to a folder."""
+    from oatkit.batch import run_frames
+    from oatkit.pipeline import Pipeline
+    from oatkit.progress import ProgressBar
+    from oatkit.reading import read
+    from oatkit.summary import summary
+
+    start = time.perf_counter()
+    loaded = Pipeline.load(pipeline, changes)
+    found = read(scan)
+    chosen = _frames(frames, found.frames)
+    check_new(output, overwrite)
+    with ProgressBar(len(chosen)) as bar:
+        result = run_frames(
+            loaded, found, output, chosen, bar.show, on_frame=lambda frame: bar.next_frame(), overwrite=overwrite
+        )
+    for line in summary(result):
+        typer.echo(line)
+    typer.echo(f"wrote {output} in {time.perf_counter() - start:.1f} s")
+    if result.failed:
+        raise SolverError(f"{len(result.failed)} of {len(chosen)} frames failed")
+
+
+@command
+def focus(
+    scan: ScanPath,
+    pipeline: Annotated[
+        str, typer.Option(metavar="PIPELINE", help="Whose preprocessing, grid and acoustic model are used.")
+    ] = "maxent",
+    changes: Changes = [],  # noqa: B006 - typer wants a plain list
+    metric: Annotated[str, typer.Option(metavar="NAME", help="The measure of sharpness that decides.")] = "variance",
+    lowest: Annotated[float | None, typer.Option(help="Lowest speed to try, m/s.")] = None,
+    highest: Annotated[float | None, typer.Option(help="Highest speed to try, m/s.")] = None,
+    frame: Annotated[int, typer.Option(min=0, help="Which frame.")] = 0,
+    figure: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE.png", help="Draw the curves into this file.")
+    ] = None,
+    as_json: AsJson = False,
+    overwrite: Overwrite = False,
+) -> None:
+    """Find the speed of sound that gives the sharpest image; to use it: --set scan.speed_of_sound_m_s=focus."""
+    from oatkit.describe import focus_text
+    from oatkit.focus import focus as find
+    from oatkit.pipeline import Pipeline
+    from oatkit.progress import ProgressBar
+    from oatkit.reading import read
+
+    if (lowest is None) != (highest is None):
+        raise ValidationError("--lowest and --highest go together: give both, or neither")
+    if figure is not None:
+        check_new(figure, overwrite)
+    loaded, found = Pipeline.load(pipeline, changes), read(scan)
+    speeds = None if lowest is None or highest is None else (lowest, highest)
+    with ProgressBar() as bar:
+        result = find(loaded, found, speeds_m_s=speeds, frame=frame, metric=metric, on_event=bar.show)
+    typer.echo(json.dumps(result.table(), indent=2, allow_nan=False) if as_json else focus_text(result))
+    if figure is not None:
+        from oatkit.atomic import write_file
+        from oatkit.focus_figure import focus_figure  # matplotlib
+        from oatkit.page import png
+
+        write_file(figure, png(focus_figure(result)), overwrite)
+        typer.echo(f"wrote {figure}", err=as_json)
+
+
+@command
+def simulate(
+    phantom: Annotated[Phantom, typer.Argument(help="What is imaged.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="SCAN.h5", help="The scan file to write.")],
+    snr: Annotated[
+        float, typer.Option(help="Signal to noise in dB, in the window that the field of view reaches.")
+    ] = 32.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    overwrite: Overwrite = False,
+) -> None:
+    """Simulate a scan of a phantom on a finer grid than the one that reconstructs, and write it with the truth."""
+    from oatkit.demo import simulated
+    from oatkit.scanfile import write_scan
+
+    check_new(output, overwrite)
+    scan, truth = simulated(phantom.value, snr, seed)
+    write_scan(scan, output, truth, overwrite=overwrite)
+    typer.echo(f"wrote {output}: {phantom.value} phantom, {snr:g} dB, seed {seed}")
+
+
+def _frames(text: str, count: int) -> list[int]:
+    """Read ``A:B``, ``A:B:C`` or ``N``. Raises `ValidationError` for anything else and for an empty choice."""
+    try:
+        numbers = [int(part) if part else None for part in text.split(":")]
+        one = len(numbers) == 1
+        chosen = [range(count)[numbers[0]]] if one else list(range(count)[slice(*numbers)])  # type: ignore[index]
+    except (ValueError, IndexError, TypeError):
+        chosen = []
+    if not chosen:
+        raise ValidationError(f"--frames {text}: expected A:B or one number within the scan's frames 0 .. {count - 1}")
+    return chosen
