@@ -89,6 +89,12 @@ def test_passes_that_have_not_settled_are_said():
     assert changes[-1] < 1e-3 < changes[0]
 
 
+def test_a_calibration_a_fifth_too_low_makes_a_deep_tube_five_times_too_absorbing():
+    """With 0.8 of the right calibration the tube in the middle comes out with 4.5 to 5.5 times its absorption."""
+    found, _ = fed_back(15, 0.8)
+    assert 4.5 < found.values[0][deep_tube()].mean() / 250 < 5.5
+
+
 @pytest.mark.parametrize(("calibration", "sentence"), [(0.8, "passed mu_s'"), (4.0, "check the calibration")])
 def test_a_wrong_calibration_is_said(calibration, sentence):
     """A calibration too low drives absorption to its limit, one too high far below the stated mean; both are said."""

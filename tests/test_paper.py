@@ -19,6 +19,7 @@ from oatkit.paper.running import run_experiment
 from oatkit.paper.setting import Setting
 from oatkit.paper.star import Star
 from oatkit.paper.sweep import sweep
+from oatkit.plot import MOST_INSIDE, Curve, Plot
 from oatkit.sheet import Panel, sheet
 from oatkit.simulate import mouse_body
 
@@ -161,3 +162,15 @@ def test_a_panel_can_carry_an_outline():
     pixels = imread(io.BytesIO(png(figure)))[..., :3]
     drawn = (pixels[..., 2] > 0.9) & (pixels[..., 0] < 0.3)
     assert 500 < drawn.sum() < 0.05 * drawn.size
+
+
+def test_a_long_legend_covers_neither_its_curves_nor_the_next_plot():
+    """Of more than a few curves the legend stands to the right of the axes, before what comes next."""
+    curves = tuple(Curve(f"MaxEnt, structural prior {i}", (0, 1), (0, i)) for i in range(MOST_INSIDE + 1))
+    figure = sheet([], [Plot("plot", curves, "x", "y")] * 2)
+    png(figure)
+    first, second = figure.axes
+    legends = [axes.get_legend().get_window_extent() for axes in (first, second)]
+    assert legends[0].x0 >= first.get_window_extent().x1
+    assert legends[0].x1 <= second.get_tightbbox().x0
+    assert legends[1].x1 <= figure.bbox.x1

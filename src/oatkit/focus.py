@@ -24,7 +24,7 @@ from oatkit.focus_metrics import METRICS, TRUSTED
 from oatkit.memo import Memo
 from oatkit.names import did_you_mean
 from oatkit.pipeline import Pipeline
-from oatkit.reconstruction import preprocess, problems, raw_key
+from oatkit.reconstruction import preprocess, problems, raw_key, strongest
 
 SOFT_TISSUE_M_S = (1400.0, 1600.0)
 """Speeds of sound of soft tissue by [Treeby2011]_, tried unless others are given or the file's is not among them."""
@@ -117,7 +117,9 @@ def focus(
     key = ("focus", *raw_key(pipeline, scan, frame), pipeline.grid, pipeline.forward, low, high, metric)
     table = memo.peek(key)
     if table is None:
-        clean = _strongest(preprocess(pipeline, scan, frame, memo))
+        clean = strongest(preprocess(pipeline, scan, frame, memo))
+        if not clean.signals[clean.valid].any():
+            raise ValidationError("focus: the data are zero, so that no speed of sound gives a sharp image")
         table = _sweep(pipeline, clean, _coarse(clean.geometry, pipeline.grid.grid(), low, high), metric, on_event)
         memo.put(key, table, 100 * len(table) * len(METRICS))
     return _read(table, metric, scan)
@@ -140,19 +142,6 @@ def _range(scan: Scan, speeds_m_s: tuple[float, float] | None) -> tuple[float, f
         raise ValidationError(f"focus: expected a range (lowest, highest) of speeds of sound in m/s, got {speeds_m_s}")
     check_range("focus: speeds_m_s", speeds_m_s, 300, 7000, "the unit is m/s; water has about 1500")
     return float(speeds_m_s[0]), float(speeds_m_s[1])
-
-
-def _strongest(clean: Scan) -> Scan:
-    """Return the scan of the wavelength with the largest signals of valid detectors."""
-    pairs = zip(clean.signals[0], clean.valid[0], strict=True)
-    size = [float(np.square(record[valid], dtype=float).sum()) for record, valid in pairs]
-    best = int(np.argmax(size))
-    if not size[best] > 0:
-        raise ValidationError("focus: the data are zero, so that no speed of sound gives a sharp image")
-    one = slice(best, best + 1)
-    return Scan(
-        clean.signals[:1, one], clean.geometry, clean.wavelengths_nm[one], clean.valid[:1, one], name=clean.name
-    )
 
 
 def _coarse(geometry: Geometry, grid: Grid, low: float, high: float) -> tuple[float, ...]:

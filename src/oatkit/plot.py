@@ -11,6 +11,10 @@ COLOURS = ("#0b6fa4", "#d1495b", "#2e8b57", "#b8860b", "#6a4c93", "#5c5c5c", "#e
 """Distinct on white, in print and to most colour-blind eyes."""
 AXIS_LEFT, AXIS_BELOW = 150, 120
 """Dots for numbers and labels of the axes."""
+MOST_INSIDE = 4
+"""A legend of more lines stands beside the axes: within them it would cover curves."""
+LEGEND_HANDLE, LEGEND_LETTER = 90, 12
+"""Dots for what stands before a label of the legend, and for each of its letters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +26,8 @@ class Curve:
     y: Sequence[float] | np.ndarray
     style: str = "-"
     """As matplotlib writes it: ``"-"``, ``"--"``, ``"o-"``."""
+    spread: Sequence[float] | np.ndarray | None = None
+    """Half the height of a band around the line, at each point."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +55,28 @@ class Plot:
     names: tuple[str, ...] = ()
     """What to write at x = 0, 1, 2, ... in place of numbers."""
 
+    @property
+    def labels(self) -> list[str]:
+        """The lines of the legend."""
+        drawn = (*(c.label for c in self.curves), *(m.label for m in self.marks), *(text for _, text in self.verticals))
+        return [label for label in drawn if label]
+
+    @property
+    def legend_width(self) -> int:
+        """Dots for a legend beside the axes; 0 where it stands within them."""
+        if len(self.labels) <= MOST_INSIDE:
+            return 0
+        return LEGEND_HANDLE + LEGEND_LETTER * max(map(len, self.labels))
+
 
 def draw_plot(page: Page, plot: Plot, left: int, bottom: int, width: int, height: int) -> None:
-    """Draw a plot into a box of the page, its title above the box."""
+    """Draw a plot into a box of the page, its title above the box, a long legend to the right of it."""
     axes = page.axes(left + AXIS_LEFT, bottom + AXIS_BELOW, width - AXIS_LEFT, height - AXIS_BELOW)
     for colour, curve in zip(_cycled(len(plot.curves)), plot.curves, strict=True):
         axes.plot(curve.x, curve.y, curve.style, color=colour, linewidth=1, markersize=2.5, label=curve.label)
+        if curve.spread is not None:
+            low, high = np.subtract(curve.y, curve.spread), np.add(curve.y, curve.spread)
+            axes.fill_between(curve.x, low, high, color=colour, alpha=0.15, linewidth=0)
     for colour, mark in zip(_cycled(len(plot.marks)), plot.marks, strict=True):
         axes.plot([mark.x], [mark.y], "D", color=colour, markersize=4.5, fillstyle="none", label=mark.label)
     for x, label in plot.verticals:
@@ -70,8 +92,9 @@ def draw_plot(page: Page, plot: Plot, left: int, bottom: int, width: int, height
     axes.tick_params(labelsize=7.5, length=2, width=0.5, colors=INK, which="both")
     for spine in axes.spines.values():
         spine.set(linewidth=0.5, color=PALE)
-    if any(curve.label for curve in plot.curves) or plot.marks:
-        axes.legend(fontsize=6.5, frameon=False)
+    if plot.labels:
+        beside = {"loc": "upper left", "bbox_to_anchor": (1, 1)} if plot.legend_width else {}
+        axes.legend(fontsize=6.5, frameon=False, **beside)
     page.text(left + AXIS_LEFT, bottom + height + 14, plot.title, size=9.5, va="bottom")
 
 

@@ -31,6 +31,16 @@ def preprocess(pipeline: Pipeline, scan: Scan, frame: int, memo: Memo | None = N
     return clean
 
 
+def strongest(clean: Scan) -> Scan:
+    """Return a preprocessed frame with one wavelength only: that of the largest signals of valid detectors."""
+    pairs = zip(clean.signals[0], clean.valid[0], strict=True)
+    best = int(np.argmax([norm(np.asarray(record[valid], dtype=float)) for record, valid in pairs]))
+    one = slice(best, best + 1)
+    return Scan(
+        clean.signals[:1, one], clean.geometry, clean.wavelengths_nm[one], clean.valid[:1, one], name=clean.name
+    )
+
+
 def problems(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iterator[tuple[float, Problem]]:
     """Yield wavelength (nm) and problem for each wavelength of a preprocessed frame."""
     key = (clean.geometry, grid, pipeline.forward)

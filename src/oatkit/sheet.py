@@ -87,7 +87,7 @@ def sheet(groups: Sequence[Sequence[Panel]], plots: Sequence[Plot] = (), title: 
     """
     rows = _rows(groups)
     widths = [sum(block.width for block in row) for row in rows]
-    width = 2 * MARGIN + max([*widths, len(plots) * (PLOT_WIDTH + GAP) - GAP])
+    width = 2 * MARGIN + max([*widths, sum(map(_plot_width, plots)) - GAP])
     notes = textwrap.wrap(" · ".join(filter(None, (caption, _legend(groups)))), width // 16)
     heading = TITLE if title else 0
     below = TITLE + PLOT_HEIGHT + GAP if plots else 0
@@ -101,8 +101,10 @@ def sheet(groups: Sequence[Sequence[Panel]], plots: Sequence[Plot] = (), title: 
             _draw_block(page, block, left, top)
             left += block.width
         top -= _height(row)
-    for i, plot in enumerate(plots):
-        draw_plot(page, plot, MARGIN + i * (PLOT_WIDTH + GAP), top - TITLE - PLOT_HEIGHT, PLOT_WIDTH, PLOT_HEIGHT)
+    left = MARGIN
+    for plot in plots:
+        draw_plot(page, plot, left, top - TITLE - PLOT_HEIGHT, PLOT_WIDTH, PLOT_HEIGHT)
+        left += _plot_width(plot)
     top -= below
     for i, line in enumerate(notes):
         page.text(MARGIN, top - i * LINE, line, size=7.5, color=PALE)
@@ -125,6 +127,10 @@ def _rows(groups: Sequence[Sequence[Panel]]) -> list[list[Block]]:
 
 def _height(row: Sequence[Block]) -> int:
     return max(block.height for block in row)
+
+
+def _plot_width(plot: Plot) -> int:
+    return PLOT_WIDTH + plot.legend_width + GAP
 
 
 def _scale(panels: Sequence[Panel]) -> Scale:

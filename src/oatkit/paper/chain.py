@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from oatkit.data import Image, Scan
+from oatkit.data import Scan
 from oatkit.engine import run
 from oatkit.paper.setting import Setting
 from oatkit.paper.simulated import BACKGROUND_PER_CM, SCATTERING_PER_CM, lit, pipeline_for, scan_of
@@ -28,11 +28,6 @@ class Mouse:
     def body(self) -> Body:
         """The simulated body."""
         return mouse_body()
-
-    @cached_property
-    def truth(self) -> Image:
-        """Initial pressure of the simulated body."""
-        return lit(self.body, self.setting.grid)[0]
 
     @cached_property
     def scan(self) -> Scan:

@@ -49,7 +49,7 @@ def scaled(result: Result) -> Image:
 def magnitude(image: Image) -> Image:
     """Return log(1 + |F|) of a plane, zero frequency in the middle."""
     values = np.log1p(abs(np.fft.fftshift(np.fft.fft2(image.values[0]))))
-    return replace(image, values=values, quantity="fourier_magnitude", unit="", wavelengths_nm=())
+    return replace(image, values=values, quantity="Fourier_magnitude", unit="", wavelengths_nm=())
 
 
 def frequency_per_mm(image: Image) -> np.ndarray:

@@ -10,13 +10,11 @@ from oatkit.names import did_you_mean
 from oatkit.paper.experiments import EXPERIMENTS
 
 
-def run_experiment(
-    name: str, folder: Path, scan: Path | None = None, overwrite: bool = False, **changes: object
-) -> Iterator[str]:
+def run_experiment(name: str, folder: Path, scan: Path | None = None, overwrite: bool = False) -> Iterator[str]:
     """Run one experiment, write ``NAME.png`` and ``NAME.md`` into `folder`, and yield a line for each thing done.
 
-    `scan` is a real scan of a mouse for the experiments on one; `changes` are fields of its `Setting`. Raises
-    `ValidationError` for an unknown name or files that are there already, unless `overwrite`.
+    `scan` is a real scan of a mouse for the experiments on one. Raises `ValidationError` for an unknown name
+    or files that are there already, unless `overwrite`.
     """
     if name not in EXPERIMENTS:
         raise ValidationError(f"no experiment named '{name}'{did_you_mean(name, EXPERIMENTS)}")
@@ -24,7 +22,7 @@ def run_experiment(
     if there and not overwrite:
         raise ValidationError(f"{there[0]}: exists already; choose another folder with -o or add --overwrite")
     module = import_module(f"oatkit.paper.{name}")
-    setting = replace(module.SETTING, scan=scan, **changes)
+    setting = replace(module.SETTING, scan=scan)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -6,7 +6,7 @@ import numpy as np
 
 from oatkit.api import Grid, Image, Segmenter, param
 from oatkit.builtin.segmenters.contours import distances, smoothed, strip_around
-from oatkit.builtin.segmenters.findings import boundary_image
+from oatkit.builtin.segmenters.findings import boundary_image, unseen_note
 from oatkit.builtin.segmenters.radial_path import SPACING_M, STEP_PX, radial_contour, seen_share
 from oatkit.builtin.segmenters.walls import Walls
 from oatkit.polygons import without_loops
@@ -16,7 +16,8 @@ MAX_SLOPE = 1.0
 SETTLED_PX = 0.25
 SETTLED_SHARE = 0.95
 """The contour is at rest when all but 5 % of its points move by less than a quarter of a pixel."""
-LEAST_SEEN = 0.9
+WELL_SEEN = 0.9
+"""Share of the contour on a visible wall below which a note says how much is on none."""
 STRAYED = 0.05
 """Loss of visible wall against the radial path above which the contour is given up."""
 
@@ -57,9 +58,7 @@ class ActiveContour(Segmenter):
         if seen < seen_before - STRAYED:
             contour, seen = start, seen_before
             notes = ("the contour strayed from the wall; the radial path that it started from is returned instead",)
-        if not seen >= LEAST_SEEN:
-            text = "lies on no visible wall; look at it before relying on it there, or raise blur"
-            notes = (*notes, f"{100 * (1 - seen):.0f} % of the contour {text}")
+        notes += unseen_note(seen, WELL_SEEN, "; look at it before relying on it there, or raise blur")
         return boundary_image(contour, image.grid, notes, seen_share=seen, rounds=rounds, moving_share=moving)
 
     def _settle(self, contour: np.ndarray, walls: Walls, grid: Grid) -> tuple[np.ndarray, int, float]:

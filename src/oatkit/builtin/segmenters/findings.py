@@ -29,6 +29,13 @@ def boundary_image(contour_m: np.ndarray, grid: Grid, notes: tuple[str, ...] = (
     return Image(signed_distance(contour, grid), "boundary", "m", grid, diagnostics=diagnostics)
 
 
+def unseen_note(seen: float, least: float, advice: str) -> tuple[str, ...]:
+    """Return the note on a contour of which a share `seen`, less than `least`, lies on a visible wall; else none."""
+    if seen >= least:
+        return ()
+    return (f"{100 * (1 - seen):.0f} % of the contour lies on no visible wall{advice}",)
+
+
 def _within(contour_m: np.ndarray, grid: Grid) -> np.ndarray:
     left, right, bottom, top = grid.extent_m
     return np.clip(contour_m, (bottom, left), (top, right))

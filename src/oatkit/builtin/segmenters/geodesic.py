@@ -8,8 +8,8 @@ from oatkit.api import Image, Segmenter, param
 from oatkit.builtin.segmenters.contours import smoothed, strip_around
 from oatkit.builtin.segmenters.findings import boundary_image
 from oatkit.builtin.segmenters.label_outline import outline_of
-from oatkit.builtin.segmenters.radial_path import LEAST_SEEN, SPACING_M, STEP_PX, seen_share
-from oatkit.builtin.segmenters.walls import Walls, no_body
+from oatkit.builtin.segmenters.radial_path import SPACING_M, STEP_PX, check_seen, seen_share
+from oatkit.builtin.segmenters.walls import Walls
 from oatkit.polygons import without_loops
 
 SNAP_MM = 0.4
@@ -44,8 +44,7 @@ class Geodesic(Segmenter):
         strip = strip_around(smoothed(outline, SPACING_M, self.rigidity), 1e-3 * SNAP_MM, 1e-3 * SNAP_MM, step)
         contour = smoothed(without_loops(strip.wall(walls, bending=1.0, max_slope=1.0)), SPACING_M, self.rigidity)
         seen = seen_share(contour, walls)
-        if not seen >= LEAST_SEEN:
-            raise no_body("no closed wall stands out of its noise and streaks")
+        check_seen(seen)
         return boundary_image(contour, image.grid, notes, seen_share=seen)
 
     def _shrunk(self, walls: Walls) -> np.ndarray:

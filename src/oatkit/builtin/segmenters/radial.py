@@ -3,12 +3,15 @@
 from typing import ClassVar
 
 from oatkit.api import Image, Segmenter, param
-from oatkit.builtin.segmenters.findings import boundary_image
+from oatkit.builtin.segmenters.findings import boundary_image, unseen_note
 from oatkit.builtin.segmenters.radial_path import radial_contour, seen_share
 from oatkit.builtin.segmenters.walls import Walls
 
 LEAST_SEEN_STAR = 0.96
 """Share of the contour on a visible wall below which the body may not be star-shaped."""
+ADVICE = (
+    ": the body may be dim there or not star-shaped from its centre; try the segmenter 'active-contour' or 'geodesic'"
+)
 
 
 class Radial(Segmenter):
@@ -33,8 +36,5 @@ class Radial(Segmenter):
         walls = Walls.of(image, self.blur, self.sensitivity)
         contour = radial_contour(walls, image.grid, self.rigidity)
         seen = seen_share(contour, walls)
-        notes = () if seen >= LEAST_SEEN_STAR else (
-            f"{100 * (1 - seen):.0f} % of the contour lies on no visible wall: the body may be dim there or not "
-            "star-shaped from its centre; try the segmenter 'active-contour' or 'geodesic'",
-        )  # fmt: skip
+        notes = unseen_note(seen, LEAST_SEEN_STAR, ADVICE)
         return boundary_image(contour, image.grid, notes, seen_share=seen)

@@ -35,8 +35,7 @@ def radial_contour(walls: Walls, grid: Grid, rigidity_mm: float) -> np.ndarray:
             break
         centre = centre + moved
     contour = smoothed(points, SPACING_M, rigidity_mm)
-    if not seen_share(contour, walls) >= LEAST_SEEN:
-        raise no_body("no closed wall stands out of its noise and streaks")
+    check_seen(seen_share(contour, walls))
     return contour
 
 
@@ -44,6 +43,12 @@ def seen_share(contour_m: np.ndarray, walls: Walls) -> float:
     """Return the share of a contour that lies on a visible wall."""
     rise = walls.rise(contour_m, inward_normals(contour_m))
     return float((walls.evidence(rise) >= 0.5).mean())
+
+
+def check_seen(share: float) -> None:
+    """Raise `SolverError` for a contour of which less than `LEAST_SEEN` lies on a visible wall."""
+    if not share >= LEAST_SEEN:
+        raise no_body("no closed wall stands out of its noise and streaks")
 
 
 def _bright_centre(walls: Walls, grid: Grid) -> np.ndarray:
