@@ -32,13 +32,19 @@ def header(
     n_samples=8,
     transducer="msot2",
     embedded=None,
+    ultrasound=None,
+    more="",
 ) -> str:
-    """The text of a header; `pulses` are the wavelengths of its frames, one sweep unless given."""
+    """The text of a header; `pulses` are the wavelengths of its frames, one sweep unless given.
+
+    `ultrasound` are the ultrasound images that go with the pulses, `more` is text before the end.
+    """
     pulses = list(wavelengths) if pulses is None else pulses
     offsets = list(range(len(pulses))) if offsets is None else offsets
     listed = "".join(f'<WAVELENGTH number="{i + 1}">{w}</WAVELENGTH>' for i, w in enumerate(wavelengths))
+    beside = [""] * len(pulses) if ultrasound is None else [f' ultraSound-frame-offset="{u}"' for u in ultrasound]
     frames = "".join(
-        f'<DataModelScanFrame><Frame timestamp="{637371523560823431 + 10**6 * i}"><Z-POS>{10 + i}</Z-POS>'
+        f'<DataModelScanFrame><Frame timestamp="{637371523560823431 + 10**6 * i}"{beside[i]}><Z-POS>{10 + i}</Z-POS>'
         f"<TEMPERATURE>{30 + i}</TEMPERATURE><WAVELENGTH>{w}</WAVELENGTH><POWER>{100 + i}</POWER></Frame>"
         f"<IDOffset>{offset}</IDOffset></DataModelScanFrame>"
         for i, (w, offset) in enumerate(zip(pulses, offsets, strict=True))
@@ -62,7 +68,50 @@ def header(
 <ScanFrames>{frames}</ScanFrames></ScanNode>
 <ReconPreset><ImpulseResponse>true</ImpulseResponse></ReconPreset>
 {f"<ImpulseResponse>{response}</ImpulseResponse>" if response else ""}
-</DataModelMsotProject>"""
+{more}</DataModelMsotProject>"""
+
+
+def field_of_view(name: str, counts, extents) -> str:
+    """A grid as newer headers give it."""
+    pixels = "".join(f"<{axis}>{n}</{axis}>" for axis, n in zip("XYZ", counts, strict=True))
+    sizes = "".join(f"<{axis}>{size!r}</{axis}>" for axis, size in zip("XYZ", extents, strict=True))
+    return f"<{name}><PixelCount>{pixels}</PixelCount><Extents>{sizes}</Extents></{name}>"
+
+
+def recon_node(guid: str, frames=None, view: str = "<Resolution>4</Resolution><Roi>0.03</Roi>") -> str:
+    """A stored reconstruction; `frames` are (IDOffset of the pulse, IDOffset of the image)."""
+    listed = "".join(
+        f"<DataModelReconstructionFrame><ScanFramesID><int>{pulse}</int></ScanFramesID><IDOffset>{record}</IDOffset>"
+        "<zOffset>0</zOffset><HasErrors>false</HasErrors></DataModelReconstructionFrame>"
+        for pulse, record in frames or ()
+    )
+    return (
+        f"<DataModelNewReconstructionNode><Name>20mm(75um)</Name><GUID>{guid}</GUID><Method>model_lin</Method>{view}"
+        f"<ReconFrames>{listed}</ReconFrames></DataModelNewReconstructionNode>"
+    )
+
+
+def msp_node(guid: str, recon_guid: str, slices) -> str:
+    """A stored unmixing; `slices` are lists of (IDOffset of the image, name of the spectrum)."""
+    listed = "".join(
+        "<MspSliceFrame><HasErrors>false</HasErrors><ReconFrameID><int>0</int></ReconFrameID><ComponentList>"
+        + "".join(
+            f"<MspSliceComponent><IDOffset>{record}</IDOffset><ComponName>c</ComponName><ComponRef>0</ComponRef>"
+            f"<invert>false</invert><SpectraName>{spectrum}</SpectraName></MspSliceComponent>"
+            for record, spectrum in components
+        )
+        + "</ComponentList></MspSliceFrame>"
+        for components in slices
+    )
+    return (
+        f"<DataModelNewMspNode><Name>MSP</Name><GUID>{guid}</GUID><ReconGUID>{recon_guid}</ReconGUID>"
+        f"<Method>regression</Method><SlicesFrame>{listed}</SlicesFrame></DataModelNewMspNode>"
+    )
+
+
+def nodes(recons=(), msps=()) -> str:
+    """The two lists of stored images."""
+    return f"<ReconNodes>{''.join(recons)}</ReconNodes><MspNodes>{''.join(msps)}</MspNodes>"
 
 
 def write(folder: Path, text: str | bytes, records: int = 2, detectors: int = 5, n_samples: int = 8) -> Path:

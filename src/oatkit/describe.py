@@ -1,15 +1,20 @@
 """Plugins and scans described in words, from their own declarations."""
 
 import inspect
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from oatkit.api import Plugin
-from oatkit.data import Scan
+from oatkit.api import Plugin, Region
+from oatkit.data import Image, Scan
+from oatkit.errors import OatkitError
 from oatkit.focus import Focus
+from oatkit.motion import Motion
 from oatkit.parameters import Parameters, bounds_of, expected
+from oatkit.reading import read_images, read_regions
 
 
 @dataclass(frozen=True)
@@ -23,6 +28,37 @@ class ParameterRow:
     default: str
     """As a pipeline file writes it."""
     meaning: str
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What a file holds beside its scan."""
+
+    images: Mapping[str, Sequence[Image]] = field(default_factory=dict)
+    """Finished images by name, one for each frame."""
+    regions: tuple[Region, ...] = ()
+    notes: tuple[str, ...] = ()
+    """Why some of it cannot be had."""
+
+
+def look_beside(path: Path) -> Beside:
+    """Return what a file holds beside its scan; what cannot be read hides neither the scan nor the rest."""
+    notes: list[str] = []
+    images: Mapping[str, Sequence[Image]] = {}
+    regions: tuple[Region, ...] = ()
+    try:
+        images = read_images(path)
+    except OatkitError as error:
+        notes.append(f"Images: {error}")
+    try:
+        regions = read_regions(path)
+    except OatkitError as error:
+        notes.append(f"Regions: {error}")
+    return Beside(images, regions, tuple(notes))
+
+
+MOST_LINES = 20
+"""How many images, and how many regions, are listed one by one for a reader's eyes."""
 
 
 def parameter_rows(cls: type[Parameters]) -> list[ParameterRow]:
@@ -43,8 +79,9 @@ def plugin_text(cls: type[Plugin], origin: str) -> str:
     return "\n".join(lines)
 
 
-def scan_table(scan: Scan) -> dict[str, Any]:
-    """Return what is known of a scan as plain values, for `info` and its JSON."""
+def scan_table(scan: Scan, beside: Beside | None = None) -> dict[str, Any]:
+    """Return what is known of a scan and what lies beside it as plain values, for `info` and its JSON."""
+    beside = beside or Beside()
     geometry = scan.geometry
     response = geometry.impulse_response
     return {
@@ -62,7 +99,9 @@ def scan_table(scan: Scan) -> dict[str, Any]:
         "temperature_c": _mean(scan.temperature_c),
         "dtype": str(scan.signals.dtype),
         "fingerprint": scan.fingerprint,
-        "notes": list(scan.notes),
+        "images": [{"name": name, "frames": len(stored)} for name, stored in beside.images.items()],
+        "regions": [region.name for region in beside.regions],
+        "notes": [*scan.notes, *beside.notes],
     }
 
 
@@ -72,9 +111,9 @@ def _mean(values: np.ndarray | None) -> float | None:
     return float(np.mean(known)) if known.size else None
 
 
-def scan_text(scan: Scan) -> str:
-    """Return what is known of a scan as lines for a reader's eyes."""
-    table = scan_table(scan)
+def scan_text(scan: Scan, beside: Beside | None = None) -> str:
+    """Return what is known of a scan and what lies beside it as lines for a reader's eyes."""
+    table = scan_table(scan, beside)
     temperature = table["temperature_c"]
     rows = {
         "scan": f"{table['name']} (reader {table['reader']})",
@@ -88,8 +127,21 @@ def scan_text(scan: Scan) -> str:
         if table["impulse_response_samples"]
         else "none",
     }
-    lines = [f"{name:<18}{value}" for name, value in rows.items()]
+    images = [f"{image['name']} ({_counted(image['frames'], 'frame')})" for image in table["images"]]
+    lines = [f"{name:<18}{value}" for name, value in (*rows.items(), *_few("image", images))]
+    lines += [f"{name:<18}{value}" for name, value in _few("region", table["regions"])]
     return "\n".join([*lines, *(f"note: {note}" for note in table["notes"])])
+
+
+def _counted(count: int, noun: str) -> str:
+    """Return ``1 frame`` or ``3 frames``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def _few(what: str, values: list[str]) -> list[tuple[str, str]]:
+    """Return a row for each value, and one for all those beyond `MOST_LINES`."""
+    rows = [(what, value) for value in values[:MOST_LINES]]
+    return [*rows, (what, f"... and {len(values) - MOST_LINES} more")] if len(values) > MOST_LINES else rows
 
 
 def focus_text(focus: Focus) -> str:
@@ -102,6 +154,14 @@ def focus_text(focus: Focus) -> str:
     ]
     lines = [f"{name:<20}{value}" for name, value in rows]
     return "\n".join([*lines, *(f"note: {note}" for note in focus.notes)])
+
+
+def motion_text(motion: Motion) -> str:
+    """Return what moved as lines: how many pulses, each of them, and what else to know."""
+    moved = motion.moved
+    head = f"{int(moved.sum())} of {moved.size} pulses out of place, in {len(motion.frames)} of {len(moved)} frames"
+    lines = [sentence for frame in motion.frames for sentence in motion.of_frame(frame)]
+    return "\n".join([head, *lines, *(f"note: {note}" for note in motion.notes)])
 
 
 def _default(value: Any) -> str:

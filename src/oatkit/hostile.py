@@ -4,7 +4,7 @@ Each refuses before it reads: sizes are compared with the limits below, HDF5 lin
 without being followed, and XML entities and document types are never expanded. What they raise is `ReadError`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from math import prod
 from pathlib import Path
@@ -18,6 +18,8 @@ MAX_XML_DEPTH = 64
 MAX_XML_ELEMENTS = 1_000_000
 MAX_CHUNK_BYTES = 64 * 2**20
 MAX_ATTRIBUTES = 100
+MAX_TEXT_BYTES = 64 * 2**10
+"""Limit for a text in an HDF5 file."""
 HDF5_FILTERS = frozenset({1, 2, 3})
 """Deflate, shuffle and fletcher32: those that every HDF5 library has built in."""
 MAX_DEFLATE_RATIO = 1100
@@ -119,38 +121,118 @@ def open_hdf5(path: Path) -> Iterator[Any]:
         raise ReadError(f"{path}: not a complete HDF5 file, or damaged ({printable(str(error), 200)})") from None
 
 
-def hdf5_dataset(file: Any, name: str, kinds: str, ndim: int, limit: int | None = None) -> Any:
-    """Return the dataset `name` of an open file, checked before anything of it is read.
+def hdf5_dataset(file: Any, name: str, kinds: str, ndim: int | Collection[int], limit: int | None = None) -> Any:
+    """Return the dataset `name` of an open file or group, checked before anything of it is read.
 
-    `kinds` are numpy's letters for the types that it may have, `limit` the largest number of bytes that it may
-    declare. Refused are links other than hard ones, external and virtual storage, more bytes declared than can be in
-    the file, oversized chunks, unusual filters and masses of attributes.
+    `kinds` are numpy's letters for the types that it may have, `ndim` the number of axes, or those that are allowed,
+    `limit` the largest number of bytes that it may declare. Refused are links other than hard ones, external and
+    virtual storage, more bytes declared than can be in the file, oversized chunks, unusual filters and masses of
+    attributes.
     """
     import h5py
 
-    where = f"{printable(str(file.filename))} '{name}'"
+    item = _hard_linked(file, name, "dataset", h5py.Dataset)
+    problem = _wrong_type(item, kinds, ndim) or _wrong_storage(item, limit)
+    if problem:
+        raise ReadError(f"{_where(file, name)}: {problem}")
+    return item
+
+
+def hdf5_group(file: Any, name: str, limit: int) -> Any:
+    """Return the group `name` of an open file or group, reached by hard links, of at most `limit` members."""
+    import h5py
+
+    group = _hard_linked(file, name, "group", h5py.Group)
+    if len(group) > limit:
+        raise ReadError(f"{_where(file, name)}: {len(group)} members; at most {limit} are read")
+    return group
+
+
+def holds_text(file: Any, name: str) -> bool:
+    """Say whether the dataset `name` of an open file or group is of a type of texts."""
+    import h5py
+
+    return h5py.check_string_dtype(_hard_linked(file, name, "dataset", h5py.Dataset).dtype) is not None
+
+
+def hdf5_text(file: Any, name: str) -> str:
+    """Return a single text of at most `MAX_TEXT_BYTES`, of fixed or variable length, or as MATLAB's character codes.
+
+    Guarded as `hdf5_dataset` is; the length of a text that lies in the file's heap is looked at before it is read.
+    """
+    import h5py
+
+    item = _hard_linked(file, name, "text", h5py.Dataset)
+    if not holds_text(file, name):
+        return _of_codes(hdf5_dataset(file, name, "u", (1, 2), MAX_TEXT_BYTES), _where(file, name))
+    one = prod(item.shape) == 1
+    problem = _wrong_storage(item, MAX_TEXT_BYTES) or _wrong_heap(item) if one else "expected one text"
+    if problem:
+        raise ReadError(f"{_where(file, name)}: {problem}")
+    return _decoded(item[()], _where(file, name))
+
+
+def _where(file: Any, name: str) -> str:
+    inside = f"{file.name}/{name}".lstrip("/")
+    return f"{printable(str(file.file.filename))} '{printable(inside, 120)}'"
+
+
+def _hard_linked(file: Any, name: str, what: str, kind: type) -> Any:
+    """Return the member `name` if it is of a kind of h5py's and every link on the way to it a hard one."""
+    import h5py
+
     item = file
     for part in name.split("/"):
         link = item.get(part, getlink=True) if isinstance(item, h5py.Group) else None
         if link is None:
-            raise ReadError(f"{where}: expected a dataset, found nothing")
+            raise ReadError(f"{_where(file, name)}: expected a {what}, found nothing")
         if not isinstance(link, h5py.HardLink):
-            raise ReadError(f"{where}: links are refused, found a {type(link).__name__}")
+            raise ReadError(f"{_where(file, name)}: links are refused, found a {type(link).__name__}")
         item = item[part]
-    if not isinstance(item, h5py.Dataset):
-        raise ReadError(f"{where}: expected a dataset, found a {type(item).__name__}")
-    problem = _wrong_type(item, kinds, ndim) or _wrong_storage(item, limit)
-    if problem:
-        raise ReadError(f"{where}: {problem}")
+    if not isinstance(item, kind):
+        raise ReadError(f"{_where(file, name)}: expected a {what}, found a {type(item).__name__}")
     return item
 
 
-def _wrong_type(item: Any, kinds: str, ndim: int) -> str:
+def _of_codes(dataset: Any, where: str) -> str:
+    """Return the text that MATLAB stores as numbers of 16 bits."""
+    if dataset.dtype.itemsize > 2:
+        raise ReadError(f"{where}: expected a text, found numbers of type {dataset.dtype}")
+    return "".join(map(chr, dataset[()].ravel().tolist()))
+
+
+def _decoded(value: Any, where: str) -> str:
+    """Return the text in what h5py gives for a dataset of one text: bytes, or an array that holds them."""
+    stored = value if isinstance(value, bytes) else value.ravel()[0]
+    try:
+        return stored.decode()
+    except UnicodeDecodeError:
+        raise ReadError(f"{where}: expected a text in UTF-8, found {bytes(stored[:16])!r}") from None
+
+
+def _wrong_heap(item: Any) -> str:
+    """Say what is wrong with the length of a text that lies in the heap of the file, or nothing."""
+    import h5py
+
+    if h5py.check_string_dtype(item.dtype).length is not None:
+        return ""
+    offset = item.id.get_offset()
+    if offset is None:
+        return "" if item.id.get_storage_size() == 0 else "a text of variable length in chunks, which is not read"
+    # What is stored is a reference: the length in 4 bytes, then the address and the index in the heap.
+    with open(item.file.filename, "rb") as file:
+        file.seek(offset)
+        length = int.from_bytes(file.read(4), "little")
+    return f"a text of {length} bytes; at most {MAX_TEXT_BYTES} are read" if length > MAX_TEXT_BYTES else ""
+
+
+def _wrong_type(item: Any, kinds: str, ndim: int | Collection[int]) -> str:
     """Say what is wrong with the type of a dataset, or nothing."""
     if item.dtype.kind not in kinds or item.dtype.hasobject:
         return f"expected a type of kind '{kinds}', found {item.dtype}"
-    if item.ndim != ndim:
-        return f"expected {ndim} axes, found the shape {item.shape}"
+    allowed = (ndim,) if isinstance(ndim, int) else ndim
+    if item.ndim not in allowed:
+        return f"expected {' or '.join(map(str, allowed))} axes, found the shape {item.shape}"
     if len(item.attrs) > MAX_ATTRIBUTES:
         return f"{len(item.attrs)} attributes; at most {MAX_ATTRIBUTES} are taken"
     return ""

@@ -1,12 +1,17 @@
 """Scans of iThera MSOT instruments."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from oatkit.api import Reader, ReadError, Scan, ValidationError, param
-from oatkit.builtin.readers.ithera_header import Header, read_header
+from oatkit.api import Image, Reader, ReadError, Region, Scan, ValidationError, param
+from oatkit.builtin.readers.ithera_annotation import read_annotation
+from oatkit.builtin.readers.ithera_header import Header, read_header, root_of
+from oatkit.builtin.readers.ithera_images import images
 from oatkit.builtin.readers.ithera_signals import raw_signals
-from oatkit.hostile import inside
+from oatkit.hostile import MAX_XML_BYTES, inside, read_at_most
+
+ANNOTATION = ".iannotation"
 
 
 class IThera(Reader):
@@ -14,6 +19,9 @@ class IThera(Reader):
 
     The three files share one name; in a folder, the header is the one named as the folder, or the only one. Signals
     stay in the file, uint16 with the offset of the instrument. Data versions 2.2 to 2.4 and the older arc geometry.
+
+    Images are what the vendor's software stored in the folders ``RECONs`` and ``MSPs``, and ultrasound in ``.us``.
+    Regions are those of iLabs in ``.iannotation``, which may also be read by itself.
     """
 
     name: ClassVar[str] = "ithera"
@@ -21,21 +29,35 @@ class IThera(Reader):
     polarity: Literal[1, -1] = param(1, "-1 where compression is stored as falling values; signals are then inverted")
 
     def can_read(self, path: Path) -> bool:
-        """Claim a file that ends in ``.msot`` and a folder that holds one to choose."""
+        """Claim a file that ends in ``.msot`` or ``.iannotation`` and a folder that holds one header to choose."""
         try:
-            return path.suffix.lower() == ".msot" if path.is_file() else _header_in(path) is not None
+            if path.is_file():
+                return path.suffix.lower() in (".msot", ANNOTATION)
+            return _header_in(path) is not None
         except (OSError, ValueError):
             return False
 
     def read(self, path: Path) -> Scan:
         """Return the scan. Raises `ReadError`."""
-        msot = _header_in(path) if path.is_dir() else path
-        if msot is None:
-            raise ReadError(f"{path}: expected a folder with one .msot header, or one named as the folder")
+        msot = _msot(path)
         try:
             return self._scan(msot, read_header(msot, self.impulse_response))
         except ValidationError as error:
             raise ReadError(f"{msot}: {error}") from None
+
+    def images(self, path: Path) -> Mapping[str, Sequence[Image]]:
+        """Return what the vendor's software stored beside the scan, and ultrasound. Raises `ReadError`."""
+        if path.suffix.lower() == ANNOTATION:
+            return {}
+        msot = _msot(path)
+        return images(root_of(read_at_most(msot, MAX_XML_BYTES), msot), msot)
+
+    def regions(self, path: Path) -> tuple[Region, ...]:
+        """Return the regions of the file ``.iannotation``: `path`, or the one named as the scan. Raises `ReadError`."""
+        if path.suffix.lower() != ANNOTATION:
+            msot = _msot(path)
+            path = inside(msot.parent, f"{msot.stem}{ANNOTATION}")
+        return read_annotation(path) if path.exists() else ()
 
     def _scan(self, msot: Path, header: Header) -> Scan:
         pulses = header.pulses
@@ -55,6 +77,16 @@ class IThera(Reader):
             speed_of_sound_source=header.speed_of_sound_source,
             notes=(*header.notes, polarity),
         )
+
+
+def _msot(path: Path) -> Path:
+    """Return the header of a scan, given as the header or as its folder. Raises `ReadError` where there is none."""
+    if path.suffix.lower() == ANNOTATION:
+        raise ReadError(f"{path}: regions of interest, not a scan; read {path.stem}.msot, or take read_regions")
+    msot = _header_in(path) if path.is_dir() else path
+    if msot is None:
+        raise ReadError(f"{path}: expected a folder with one .msot header, or one named as the folder")
+    return msot
 
 
 def _header_in(folder: Path) -> Path | None:

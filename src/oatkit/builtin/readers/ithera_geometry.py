@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
+from oatkit.builtin.readers.plane import extent, flat_axes, seen_along
 from oatkit.builtin.readers.xml_fields import Node
 from oatkit.data import Detectors
 
 MAX_DETECTORS = 65_536
-PLANE_TOLERANCE_M = 1e-4
 
 
 def detectors(hardware: Node) -> Detectors:
@@ -19,9 +19,7 @@ def detectors(hardware: Node) -> Detectors:
     description = hardware.get("FRAME-DESC")
     equal = description.find("EQUAL")
     points = _listed(description) if equal is None else _equally_spaced(equal)
-    across = _axis_across(points, description)
-    x, y = points[:, [axis for axis in range(3) if axis != across]].T
-    return Detectors(np.stack([y, x], axis=1))
+    return seen_along(points, _axis_across(points, description))
 
 
 def _listed(description: Node) -> np.ndarray:
@@ -59,9 +57,9 @@ def _equally_spaced(equal: Node) -> np.ndarray:
 def _axis_across(points: np.ndarray, description: Node) -> int:
     """Return the axis along which the detectors do not extend; z, then y, where there are several."""
     # Version 2.3 holds the image plane in the first and the third axis, the others in the first and the second.
-    spread = np.ptp(points, axis=0)
-    across = [axis for axis in (2, 1, 0) if spread[axis] <= PLANE_TOLERANCE_M]
-    if not across:
-        found = " x ".join(f"{1e3 * s:.3g}" for s in spread)
-        raise description.error("detectors in one plane (3-D arrays are not supported)", f"an array of {found} mm")
-    return across[0]
+    flat = flat_axes(points)
+    if not flat:
+        raise description.error(
+            "detectors in one plane (3-D arrays are not supported)", f"an array of {extent(points)}"
+        )
+    return flat[0]

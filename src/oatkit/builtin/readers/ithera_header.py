@@ -37,9 +37,7 @@ class Header:
 def read_header(msot: Path, with_response: bool) -> Header:
     """Return the header of a scan. Raises `ReadError`, and `ValidationError` for values out of physical range."""
     content = read_at_most(msot, MAX_XML_BYTES)
-    root = Node(parse_xml(content, msot), str(msot))
-    if root.element.tag != "DataModelMsotProject":
-        raise ReadError(f"{msot}: expected an iThera header <DataModelMsotProject>, found <{root.element.tag[:60]}>")
+    root = root_of(content, msot)
     hardware, measurement = root.get("HARDWARE-DESC"), root.get("MEASUREMENT-DESC")
     _check_flat(hardware)
     sampling_rate_hz = hardware.get("SAMPLING-FREQUENCY").frequency_hz()
@@ -54,6 +52,14 @@ def read_header(msot: Path, with_response: bool) -> Header:
     return Header(
         _name(root, msot), geometry, source, taken, tuple(filter(None, notes)), hashlib.sha256(content).hexdigest()
     )
+
+
+def root_of(content: bytes, msot: Path) -> Node:
+    """Return the root of a header. Raises `ReadError` where the content is another one."""
+    root = Node(parse_xml(content, msot), str(msot))
+    if root.element.tag != "DataModelMsotProject":
+        raise ReadError(f"{msot}: expected an iThera header <DataModelMsotProject>, found <{root.element.tag[:60]}>")
+    return root
 
 
 def _check_flat(hardware: Node) -> None:

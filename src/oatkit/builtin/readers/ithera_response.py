@@ -26,13 +26,21 @@ def impulse_response(header: Node, msot: Path, n_samples: int) -> tuple[np.ndarr
         return None, "There is no impulse response beside or in the header: signals are taken as the ideal ones."
     if len(content) != 8 * n_samples:
         raise ReadError(f"{origin}: expected {8 * n_samples} bytes of impulse response, found {len(content)}")
-    values = np.frombuffer(content, "<f8").copy()
+    return centred(np.frombuffer(content, "<f8").copy(), origin)
+
+
+def centred(values: np.ndarray, origin: str) -> tuple[np.ndarray, str]:
+    """Return a stored response without flag, time zero at index ``n // 2`` and scaled, with a note.
+
+    `origin` is the file and the place in it. Raises `ReadError` where the response is not finite, or all zeros.
+    """
     if values[0] >= FLAG:
         values[0] -= FLAG
     scale = _largest_magnitude(values, origin)
-    centred = abs(int(np.argmax(abs(values))) - n_samples // 2) <= n_samples // 4
-    moved = "" if centred else ", moved from index 0 (where its peak is) to the centre"
-    values = values if centred else np.fft.fftshift(values)
+    middle = len(values) // 2
+    in_place = abs(int(np.argmax(abs(values))) - middle) <= len(values) // 4
+    moved = "" if in_place else ", moved from index 0 (where its peak is) to the centre"
+    values = values if in_place else np.fft.fftshift(values)
     return values / scale, f"Impulse response from {Path(origin).name}, divided by {scale:.4g}{moved}."
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from oatkit.builtin.readers.fingerprint import sampled_fingerprint
+from oatkit.builtin.readers.indexing import expanded
 from oatkit.content import read_only
 from oatkit.errors import ReadError
 from oatkit.hostile import regular_file
@@ -45,7 +46,7 @@ class RawSignals:
         return SAMPLE
 
     def __getitem__(self, index: Any) -> np.ndarray:
-        frame, wavelength, *rest = _expanded(index)
+        frame, wavelength, *rest = expanded(index)
         wanted = np.asarray(self.offsets[frame, wavelength])
         picked = self._records()[wanted][(*(slice(None),) * wanted.ndim, *rest)]
         return np.array(~picked if self.inverted else picked)
@@ -79,16 +80,3 @@ def raw_signals(path: Path, offsets: np.ndarray, record: tuple[int, int], invert
         return RawSignals(path, read_only(offsets), record, inverted, salt, sampled_fingerprint(path, salt))
     except OSError as error:
         raise ReadError(f"{path}: cannot be read ({error.strerror})") from None
-
-
-def _expanded(index: Any) -> list[Any]:
-    """Return an index of four entries. Raises `IndexError` for what is no whole number, slice or ellipsis."""
-    entries = list(index) if isinstance(index, tuple) else [index]
-    if any(not (e is Ellipsis or isinstance(e, int | np.integer | slice)) or isinstance(e, bool) for e in entries):
-        raise IndexError("signals of a file take whole numbers, slices and '...' as index")
-    gap = next((i for i, e in enumerate(entries) if e is Ellipsis), len(entries))
-    after = entries[gap + 1 :]
-    missing = 4 - gap - len(after)
-    if missing < 0 or any(e is Ellipsis for e in after):
-        raise IndexError(f"signals have 4 axes, the index has {len(entries)} entries")
-    return entries[:gap] + [slice(None)] * missing + after
