@@ -8,7 +8,7 @@ import numpy as np
 from oatkit.content import ByContent, check_range, read_only
 from oatkit.data import Grid, Image
 from oatkit.errors import ValidationError
-from oatkit.polygons import contains, crossings
+from oatkit.polygons import contains
 
 CORNERS = 256
 """Of the polygon that stands for an ellipse where one is asked for: within 0.02 % of its size."""
@@ -31,9 +31,10 @@ class Region(ByContent, ABC):
 
 @dataclass(frozen=True, eq=False)
 class PolygonRegion(Region):
-    """A closed polygon.
+    """A closed polygon. Sides may cross, as in outlines drawn by hand.
 
-    Raises `ValidationError` for fewer than three corners, or sides that cross.
+    Inside is what a ray to infinity leaves through an odd number of sides. Raises `ValidationError` for fewer than
+    three corners.
     """
 
     name: str
@@ -47,8 +48,6 @@ class PolygonRegion(Region):
                 f"region '{self.name}': expected three corners (y, x) or more, got the shape {vertices.shape}"
             )
         check_range(f"region '{self.name}'", vertices, -1.0, 1.0, "the unit is m, so 10 mm is 0.01")
-        if len(crossings(vertices)):
-            raise ValidationError(f"region '{self.name}': sides of the polygon cross each other")
         object.__setattr__(self, "vertices_m", vertices)
 
     def mask(self, grid: Grid) -> np.ndarray:

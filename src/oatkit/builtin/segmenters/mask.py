@@ -8,7 +8,7 @@ import numpy as np
 from oatkit.api import Image, Segmenter, ValidationError, param
 from oatkit.builtin.segmenters.findings import boundary_image
 from oatkit.builtin.segmenters.label_outline import outline_of
-from oatkit.builtin.segmenters.mask_file import PICTURES, read_labels
+from oatkit.label_files import PICTURES, read_labels
 
 
 class Mask(Segmenter):

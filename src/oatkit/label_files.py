@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from oatkit.api import OatkitError, ReadError
+from oatkit.errors import OatkitError, ReadError
 from oatkit.hostile import printable, read_at_most
 
 MOST_BYTES = 256 * 2**20
 MOST_PIXELS = 10_000**2
 PICTURES = (".png", ".tif", ".tiff")
+"""Endings of those whose row 0 lies at the top, as viewers draw them; it lies at the bottom in ``.npy`` files."""
+LABEL_FILES = (".npy", *PICTURES)
 
 
 def read_labels(path: Path) -> np.ndarray:
@@ -21,7 +23,7 @@ def read_labels(path: Path) -> np.ndarray:
     Pickled objects are refused, sizes are compared with the limits above before pixels are read. Raises `ReadError`.
     """
     suffix = path.suffix.lower()
-    if suffix not in (".npy", *PICTURES):
+    if suffix not in LABEL_FILES:
         raise ReadError(f"{path}: a mask is read from .npy, .png, .tif or .tiff, not from '{printable(suffix)}'")
     content = read_at_most(path, MOST_BYTES)
     reader = {".npy": _npy, ".png": _png}.get(suffix, _tiff)
