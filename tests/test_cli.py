@@ -15,7 +15,24 @@ import oatkit
 from packages import run_oatkit
 
 SMALL = ("--set", "grid.pixels=32", "--set", "grid.field_of_view_mm=9")
-COMMANDS = ("demo", "paper", "info", "run", "focus", "pipeline", "plugins", "describe", "simulate", "export", "verify")
+COMMANDS = (
+    "demo",
+    "paper",
+    "info",
+    "run",
+    "motion",
+    "focus",
+    "pipeline",
+    "plugins",
+    "describe",
+    "simulate",
+    "export",
+    "verify",
+    "roi",
+    "challenge",
+    "kinetics",
+    "report",
+)
 
 
 @pytest.fixture(scope="module")

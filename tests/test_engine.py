@@ -11,6 +11,7 @@ from oatkit import Memo, Pipeline, PluginError, SolverError, ValidationError, lo
 from oatkit.api import ForwardModel, Iterate, Problem, Segmenter, Solver, param
 from oatkit.data import Image
 from oatkit.events import StepDone, StepIterate
+from oatkit.rules import resolve
 
 SMALL = ("grid.pixels=32", "grid.field_of_view_mm=9.0")
 
@@ -211,6 +212,19 @@ def test_a_weight_rule_is_resolved_once_and_recorded(small_scan, tmp_path):
     assert len(choice["curve"]) >= 10
     again = run(small("lsqr", f"reconstruct.weight={chosen!r}"), small_scan)
     assert np.array_equal(again["initial_pressure"].values, result["initial_pressure"].values)
+
+
+def test_a_weight_is_chosen_on_the_strongest_wavelength(small_scan):
+    """Beside weaker signals, and a channel of larger ones that is not valid, the L-curve is that of the strongest."""
+    quick = ("reconstruct.weight=l-curve", "reconstruct.n_iterations=5")
+    pipeline = small("lsqr", *quick).model_copy(update={"preprocess": ()})
+    valid = np.ones((2, 2, 48), bool)
+    valid[:, 0, 7] = False
+    both = np.repeat(np.asarray(small_scan.signals), 2, axis=1)
+    both[:, 0] *= 0.5
+    both[:, 0, 7] = 1e6
+    two = replace(small_scan, signals=both, wavelengths_nm=(700.0, 800.0), valid=valid)
+    assert resolve(pipeline, two).weight == resolve(pipeline, small_scan).weight
 
 
 def test_a_speed_of_sound_by_focus_is_resolved_once_and_recorded(small_scan, tmp_path):

@@ -14,33 +14,36 @@ SOURCE = Path(oatkit.__file__).parent
 HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg", "h5py", "skimage", "tifffile", "typer")
 
 ORDER = [
-    {"errors", "names", "vectors", "laplacian", "compiled"},
+    {"errors", "names", "vectors", "laplacian", "compiled", "running_statistics"},
     {"content", "atomic", "threads", "plain", "page", "hostile", "focus_metrics"},
     {"csv_table", "data", "plot"},
-    {"parameters", "checked", "metrics", "optics", "polygons", "scale", "scanfile", "spectra", "words"},
-    {"problem", "masking", "outlines", "regions", "tables"},
-    {"absorption", "api"},
+    {
+        "parameters", "checked", "label_files", "metrics", "optics", "plausible", "polygons", "scale", "scanfile",
+        "spectra", "words",
+    },
+    {"problem", "ipasc", "masking", "outlines", "regions", "tables"},
+    {"absorption", "api", "motion"},
     {"blame", "events", "fixed_point", "hookspecs", "simulate"},
     {"registry", "weights"},
     {"pipeline", "reading"},
-    {"provenance", "result"},
-    {"manifest", "memo", "sheet"},
-    {"store_writer", "figure", "reconstruction"},
+    {"provenance", "region_files", "result"},
+    {"frame_series", "manifest", "memo", "sheet"},
+    {"store_writer", "figure", "kinetics", "motion_figure", "region_curves", "reconstruction", "region_table"},
     {"quantification", "focus"},
     {"rules"},
-    {"store", "engine", "describe", "focus_figure", "spectra_figure"},
-    {"batch", "export", "summary", "progress"},
+    {"store", "engine", "describe", "focus_figure", "region_text", "spectra_figure"},
+    {"batch", "convert", "export", "report", "summary", "progress"},
     {"demo", "paper"},
     {"cli"},
-]
+]  # fmt: skip
 """Layers of modules from the ground up: a module imports only from layers below its own."""
 
 UPWARDS = {("result", "store")}
 """The one exception: `Result.save` is promised, and imports the store when it is called."""
 
 FOR_BUILTINS = {
-    "api", "compiled", "content", "data", "errors", "hostile", "laplacian", "masking", "parameters",
-    "polygons", "regions", "scanfile", "spectra", "threads", "vectors",
+    "api", "compiled", "content", "data", "errors", "hostile", "ipasc", "label_files", "laplacian", "masking",
+    "parameters", "plausible", "polygons", "regions", "scanfile", "spectra", "threads", "vectors",
 }  # fmt: skip
 
 

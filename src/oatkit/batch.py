@@ -1,6 +1,7 @@
 """Many frames through one pipeline, streamed into a result on disk."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from oatkit.data import Scan
@@ -10,7 +11,7 @@ from oatkit.events import Listener, ignore
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.result import Result
-from oatkit.rules import resolve
+from oatkit.rules import motion_in, resolve
 from oatkit.store import StoreWriter, load
 
 
@@ -26,17 +27,21 @@ def run_frames(
     """Run `pipeline` over `frames` (all unless said) and return the result that now lies in the folder `path`.
 
     Rules (weight, speed of sound) are replaced and the operator built once. A frame that fails is recorded with its
-    reason and the rest goes on. Raises `ValidationError` for a frame that does not exist, `ResultError` where the
-    result cannot be written, and the frame's own error where every frame failed; then nothing is left at `path`.
+    reason and the rest goes on. Frames with a pulse out of place are no part of the result where the pipeline's table
+    ``[motion]`` says ``leave_out``; each frame's warnings list them. Raises `ValidationError` for a frame that does not
+    exist and where all are left out, `ResultError` where the result cannot be written, and the frame's own error where
+    every frame failed; then nothing is left at `path`.
     """
     chosen = list(range(scan.frames) if frames is None else frames)
     missing = [f for f in chosen if not 0 <= f < scan.frames]
     if missing or not chosen:
         raise ValidationError(f"frames {missing or chosen}: the scan has frames 0 .. {scan.frames - 1}")
+    scan.geometry.check_grid(pipeline.grid.grid())  # a slip of the pipeline's is not each frame's failure
+    memo = Memo()
+    left_out = _left_out(pipeline, scan, chosen, memo, on_event)
+    chosen = [frame for frame in chosen if frame not in left_out]
     with StoreWriter(path, frames=len(chosen), source=scan.source, overwrite=overwrite) as writer:
-        memo = Memo()
-        scan.geometry.check_grid(pipeline.grid.grid())  # a slip of the pipeline's is not each frame's failure
-        resolved = resolve(pipeline, scan, memo, on_event)
+        resolved = replace(resolve(pipeline, scan, memo, on_event), left_out=left_out)
         failures = []
         for index, frame in enumerate(chosen):
             try:
@@ -50,3 +55,17 @@ def run_frames(
         if len(failures) == len(chosen):
             raise failures[0]
     return load(path)
+
+
+def _left_out(pipeline: Pipeline, scan: Scan, chosen: list[int], memo: Memo, on_event: Listener) -> tuple[int, ...]:
+    """Return which frames are not run, since a pulse of theirs is out of place."""
+    motion = motion_in(pipeline, scan, memo, on_event)
+    if motion is None or pipeline.motion is None or not pipeline.motion.leave_out:
+        return ()
+    left_out = tuple(frame for frame in motion.frames if frame in chosen)
+    if len(left_out) == len(set(chosen)):
+        raise ValidationError(
+            f"[motion].leave_out: all frames asked for are out of place: {', '.join(map(str, left_out))}; "
+            "set it to false to see them"
+        )
+    return left_out

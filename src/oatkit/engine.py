@@ -4,6 +4,7 @@ Script, command line and window all drain the same generator, `steps`; so the sa
 everywhere. A step is computed again only where the scan, the frame or a step up to it has changed (`Memo`).
 """
 
+import math
 import time
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -35,7 +36,7 @@ def run_resolved(resolved: Resolved, scan: Scan, frame: int, memo: Memo, on_even
     """Run a pipeline whose rules `oatkit.rules.resolve` has replaced."""
     images: dict[str, Image] = {}
     seconds: dict[str, float] = {}
-    notes = [*scan.notes, *resolved.notes]
+    notes = [*scan.notes, *resolved.notes, *resolved.notes_on(frame)]
     for event in steps(resolved.pipeline, scan, frame, memo):
         on_event(event)
         if isinstance(event, StepDone):
@@ -51,6 +52,7 @@ def run_resolved(resolved: Resolved, scan: Scan, frame: int, memo: Memo, on_even
         seconds=seconds,
         warnings=tuple(dict.fromkeys(notes)),
         frame_index=frame,
+        time_s=_time_of(scan, frame),
         weight_choice=resolved.weight.table() if resolved.weight else {},
         speed_choice=resolved.speed.table() if resolved.speed else {},
     )
@@ -98,6 +100,12 @@ def describe_scan(scan: Scan, resolved: Resolved) -> dict[str, Any]:
         "speed_of_sound_source": scan.speed_of_sound_source if used is None else _origin(scan, resolved),
         "notes": list(scan.notes),
     }
+
+
+def _time_of(scan: Scan, frame: int) -> float | None:
+    """Return the mean time of a frame's pulses, s; None where it is not known."""
+    time_s = float("nan") if scan.timestamps_s is None else float(scan.timestamps_s[frame].mean())
+    return time_s if math.isfinite(time_s) else None
 
 
 def _origin(scan: Scan, resolved: Resolved) -> str:

@@ -99,6 +99,8 @@ class FrameEntry(_Entry):
     """What differs between frames."""
 
     frame_index: int
+    time_s: float | None = None
+    """Mean time of its pulses, s."""
     seconds: Plain
     warnings: tuple[str, ...]
     images: dict[str, MadeEntry]
@@ -109,6 +111,7 @@ class FrameEntry(_Entry):
         made = {name: {"history": image.history, "diagnostics": image.diagnostics} for name, image in result.items()}
         frame = {
             "frame_index": result.frame_index,
+            "time_s": result.time_s,
             "seconds": result.seconds,
             "warnings": result.warnings,
             "images": made,

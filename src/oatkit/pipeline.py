@@ -13,7 +13,7 @@ from oatkit.errors import ValidationError
 from oatkit.names import did_you_mean
 from oatkit.parameters import Context, Parameters, param, problems
 from oatkit.registry import installed
-from oatkit.tables import AbsorptionTable, GridTable, OpticsTable, ScanTable
+from oatkit.tables import AbsorptionTable, GridTable, MotionTable, OpticsTable, ScanTable
 
 BUILDS_ON: Mapping[str, str] = {"fluence": "segment", "absorption": "fluence"}
 """Which step needs which other one."""
@@ -27,6 +27,7 @@ class Pipeline(Parameters):
 
     version: Literal[1] = param(1, "version of the file format")
     scan: ScanTable = param(ScanTable(), "overrides of what the scan file says")
+    motion: MotionTable | None = param(None, "whether frames out of place are looked for")
     grid: GridTable = param(GridTable(), "the image to reconstruct")
     preprocess: tuple[Preprocessor, ...] = param((), "steps on the raw signals, in this order")
     forward: ForwardModel = param(..., "acoustic model")

@@ -33,6 +33,10 @@ class Frames(Protocol):
         """Read one frame."""
         ...
 
+    def when(self, index: int) -> tuple[int, float | None]:
+        """Say which frame of the scan a frame is, and its time, s."""
+        ...
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Mapping[str, Image]):
@@ -57,6 +61,8 @@ class Result(Mapping[str, Image]):
     warnings: tuple[str, ...] = ()
     frame_index: int = 0
     """Which frame of the scan this is."""
+    time_s: float | None = None
+    """Mean time of the frame's pulses, s; None where the scan does not know it."""
     weight_choice: Mapping[str, Any] = field(default_factory=dict)
     """How a rule chose the weight; empty where the weight was given as a number."""
     speed_choice: Mapping[str, Any] = field(default_factory=dict)
@@ -104,9 +110,20 @@ class Result(Mapping[str, Image]):
 
         Raises `ValidationError` where there is none, `ResultError` where it failed, with the reason, or is damaged.
         """
+        self._check_frame(index)
+        return self.stored.read(index) if self.stored else self
+
+    def when(self, index: int) -> tuple[int, float | None]:
+        """Return which frame of the scan frame `index` of this result is, and its `time_s`; no image is read.
+
+        Raises as `frame` does.
+        """
+        self._check_frame(index)
+        return self.stored.when(index) if self.stored else (self.frame_index, self.time_s)
+
+    def _check_frame(self, index: int) -> None:
         if not 0 <= index < self.frames:
             raise ValidationError(f"frame {index}: the result has frames 0 .. {self.frames - 1}")
-        return self.stored.read(index) if self.stored else self
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write all frames to a result folder; see `oatkit.store`. Raises `ResultError`."""

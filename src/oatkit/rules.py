@@ -8,9 +8,9 @@ from oatkit.data import Scan
 from oatkit.events import Listener, StepStarted, ignore
 from oatkit.focus import Focus, focus
 from oatkit.memo import Memo
+from oatkit.motion import Motion, find_motion
 from oatkit.pipeline import Pipeline
-from oatkit.reconstruction import preprocess, problems
-from oatkit.vectors import norm
+from oatkit.reconstruction import preprocess, problems, strongest
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,21 @@ class Resolved:
     """How the weight was chosen; None where it was given as a number."""
     speed: Focus | None = None
     """How the speed of sound was chosen; None where it was not by focus."""
+    motion: Motion | None = None
+    """Which pulses are out of place; None where nobody asked."""
+    left_out: tuple[int, ...] = ()
+    """Frames of the scan that are not run, since they are out of place."""
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What to know before trusting the choices."""
-        return (*(self.speed.notes if self.speed else ()), *(self.weight.notes if self.weight else ()))
+        found = (self.speed, self.weight, self.motion)
+        left_out = (f"left out: frames {', '.join(map(str, self.left_out))} (motion)",) if self.left_out else ()
+        return (*(note for part in found if part for note in part.notes), *left_out)
+
+    def notes_on(self, frame: int) -> tuple[str, ...]:
+        """What to know of one frame of the scan."""
+        return self.motion.of_frame(frame) if self.motion else ()
 
 
 def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None, on_event: Listener = ignore) -> Resolved:
@@ -39,17 +49,31 @@ def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None, on_event: 
     alone.
     """
     memo = Memo() if memo is None else memo
+    motion = motion_in(pipeline, scan, memo, on_event)
     speed = None
     ready = pipeline
     if pipeline.scan.speed_of_sound_m_s == "focus":
         speed = focus(pipeline, scan, memo=memo, on_event=on_event)
         ready = speed.apply(pipeline)
     if not isinstance(getattr(pipeline.reconstruct, "weight", None), str):
-        return Resolved(ready, pipeline, None, speed)
+        return Resolved(ready, pipeline, None, speed, motion)
     on_event(StepStarted("choosing the weight"))
-    clean = preprocess(ready, scan, 0, memo)
-    each = problems(ready, clean, ready.grid.grid(), memo)
-    _, strongest = max(each, key=lambda pair: norm(pair[1].data))
+    clean = strongest(preprocess(ready, scan, 0, memo))
+    _, problem = next(problems(ready, clean, ready.grid.grid(), memo))
     with blame(ready.reconstruct):
-        solver, choice = weights.resolve(ready.reconstruct, strongest)
-    return Resolved(ready.with_solver(solver), pipeline, choice, speed)
+        solver, choice = weights.resolve(ready.reconstruct, problem)
+    return Resolved(ready.with_solver(solver), pipeline, choice, speed, motion)
+
+
+def motion_in(pipeline: Pipeline, scan: Scan, memo: Memo, on_event: Listener = ignore) -> Motion | None:
+    """Return which pulses of the whole scan are out of place, where the pipeline has a table ``[motion]``."""
+    settings = pipeline.motion
+    if settings is None:
+        return None
+
+    def find() -> Motion:
+        on_event(StepStarted("looking for motion"))
+        return find_motion(pipeline.scan.apply(scan), settings, pipeline.grid.grid())
+
+    key = ("motion", scan.fingerprint, pipeline.scan, settings, pipeline.grid)
+    return memo.get(key, find, lambda found: 3 * found.correlation.nbytes)

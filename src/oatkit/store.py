@@ -62,6 +62,11 @@ class Store:
             raise ResultError(f"{self.path}: the manifest does not know frame {index}")
         return self.manifest.records[str(index)]
 
+    def when(self, index: int) -> tuple[int, float | None]:
+        """Return which frame of the scan frame `index` is, and its time, s; raises as `read` does."""
+        record = self.record(index)
+        return record.frame_index, record.time_s
+
     def image(self, index: int, name: str) -> Image:
         """Read one image of frame `index`; raises as `read` does."""
         made, entry, file = self.record(index).images.get(name), self.manifest.images[name], chunk_file(name, index)
@@ -103,6 +108,7 @@ class Store:
             seconds=record.seconds if record else {},
             warnings=record.warnings if record else (),
             frame_index=record.frame_index if record else 0,
+            time_s=record.time_s if record else None,
             weight_choice=manifest.weight_choice,
             speed_choice=manifest.speed_choice,
             stored=stored,

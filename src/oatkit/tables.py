@@ -1,4 +1,4 @@
-"""The tables of a pipeline file that are no plugins: scan, grid, optics, absorption."""
+"""The tables of a pipeline file that are no plugins: scan, motion, grid, optics, absorption."""
 
 from pathlib import Path
 from typing import Literal
@@ -32,6 +32,18 @@ class ScanTable(Parameters):
         if self.start_time_us is not None:
             scan = scan.with_start_time(self.start_time_us * 1e-6)
         return scan
+
+
+class MotionTable(Parameters):
+    """The table ``[motion]``: frames with a pulse out of place are found before anything is reconstructed."""
+
+    threshold: float = param(
+        6.0, "how far below the typical correlation a pulse is out of place, in robust standard deviations", above=0
+    )
+    least_drop: float = param(
+        0.1, "least drop below the typical correlation that counts, relative to it", above=0, below=1
+    )
+    leave_out: bool = param(False, "whether frames with a pulse out of place are left out of a run over many frames")
 
 
 class GridTable(Parameters):

@@ -6,7 +6,7 @@ import numpy as np
 
 from oatkit.data import Image
 
-SIGNED = ("boundary",)
+SIGNED = ("boundary", "change", "area_under_curve", "wash_in_slope")
 """Quantities that are negative by nature."""
 
 

@@ -18,10 +18,13 @@ from oatkit.api import (
 
 @hookimpl
 def oatkit_readers() -> list[type[Reader]]:
+    from oatkit.builtin.readers.ipasc import Ipasc
     from oatkit.builtin.readers.ithera import IThera
     from oatkit.builtin.readers.oatkit_hdf5 import OatkitHdf5
+    from oatkit.builtin.readers.patato import Patato
+    from oatkit.builtin.readers.plain_array import PlainArray
 
-    return [IThera, OatkitHdf5]
+    return [Ipasc, IThera, OatkitHdf5, Patato, PlainArray]
 
 
 @hookimpl
@@ -88,7 +91,8 @@ def oatkit_segmenters() -> list[type[Segmenter]]:
 
 @hookimpl
 def oatkit_unmixers() -> list[type[Unmixer]]:
+    from oatkit.builtin.unmixers.fluence_corrected import FluenceCorrected
     from oatkit.builtin.unmixers.lstsq import LstsqUnmixer
     from oatkit.builtin.unmixers.nnls import NnlsUnmixer
 
-    return [NnlsUnmixer, LstsqUnmixer]
+    return [NnlsUnmixer, LstsqUnmixer, FluenceCorrected]

@@ -37,6 +37,17 @@ ScanPath = Annotated[
 ResultPath = Annotated[Path, typer.Argument(metavar="OUT.zarr", help="A result that `oatkit run` has written.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what is there already.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
+RegionFiles = Annotated[
+    list[Path],
+    typer.Option(
+        "--regions",
+        "-r",
+        metavar="FILE",
+        readable=False,
+        help="Regions of interest: a .toml, a mask or labels (.npy, .tif, .png), or a file that a reader knows. "
+        "Repeatable.",
+    ),
+]
 Changes = Annotated[
     list[str],
     typer.Option("--set", metavar="SLOT.KEY=VALUE", help="Change the pipeline: reconstruct.weight=0.01. Repeatable."),
@@ -95,3 +106,18 @@ def check_new(path: Path, overwrite: bool) -> None:
     """Refuse, before any work is done, to write over what is there."""
     if os.path.lexists(path) and not overwrite:
         raise ValidationError(f"{path}: exists already; choose another name or add --overwrite")
+
+
+def frames_in(text: str, count: int, option: str = "--frames", what: str = "scan") -> list[int]:
+    """Read ``A:B``, ``A:B:C`` or ``N``. Raises `ValidationError` for anything else and for an empty choice."""
+    try:
+        numbers = [int(part) if part else None for part in text.split(":")]
+        one = len(numbers) == 1
+        chosen = [range(count)[numbers[0]]] if one else list(range(count)[slice(*numbers)])  # type: ignore[index]
+    except (ValueError, IndexError, TypeError):
+        chosen = []
+    if not chosen:
+        raise ValidationError(
+            f"{option} {text}: expected A:B or one number within the {what}'s frames 0 .. {count - 1}"
+        )
+    return chosen

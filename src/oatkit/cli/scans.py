@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from oatkit.cli.app import AsJson, Changes, Overwrite, ScanPath, check_new, command
+from oatkit.cli.app import AsJson, Changes, Overwrite, ScanPath, check_new, command, frames_in
 from oatkit.errors import SolverError, ValidationError
 
 
@@ -23,12 +23,12 @@ class Phantom(StrEnum):
 
 @command
 def info(scan: ScanPath, as_json: AsJson = False) -> None:
-    """Print what is in a scan file, and where its speed of sound came from."""
-    from oatkit.describe import scan_table, scan_text
+    """Print what is in a scan file, where its speed of sound came from, and the images and regions beside it."""
+    from oatkit.describe import look_beside, scan_table, scan_text
     from oatkit.reading import read
 
-    found = read(scan)
-    typer.echo(json.dumps(scan_table(found), indent=2, allow_nan=False) if as_json else scan_text(found))
+    found, more = read(scan), look_beside(scan)
+    typer.echo(json.dumps(scan_table(found, more), indent=2, allow_nan=False) if as_json else scan_text(found, more))
 
 
 @command
@@ -52,7 +52,7 @@ def run(
     start = time.perf_counter()
     loaded = Pipeline.load(pipeline, changes)
     found = read(scan)
-    chosen = _frames(frames, found.frames)
+    chosen = frames_in(frames, found.frames)
     check_new(output, overwrite)
     with ProgressBar(len(chosen)) as bar:
         result = run_frames(
@@ -62,7 +62,34 @@ def run(
         typer.echo(line)
     typer.echo(f"wrote {output} in {time.perf_counter() - start:.1f} s")
     if result.failed:
-        raise SolverError(f"{len(result.failed)} of {len(chosen)} frames failed")
+        raise SolverError(f"{len(result.failed)} of {result.frames} frames failed")
+
+
+@command
+def motion(
+    scan: ScanPath,
+    figure: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE.png", help="Draw the curve into this file.")
+    ] = None,
+    as_json: AsJson = False,
+    overwrite: Overwrite = False,
+) -> None:
+    """Find pulses out of place, by breathing or otherwise; to leave such frames out: --set motion.leave_out=true."""
+    from oatkit.describe import motion_text
+    from oatkit.motion import find_motion
+    from oatkit.reading import read
+
+    if figure is not None:
+        check_new(figure, overwrite)
+    found = find_motion(read(scan))
+    typer.echo(json.dumps(found.table(), indent=2, allow_nan=False) if as_json else motion_text(found))
+    if figure is not None:
+        from oatkit.atomic import write_file
+        from oatkit.motion_figure import motion_figure  # matplotlib
+        from oatkit.page import png
+
+        write_file(figure, png(motion_figure(found)), overwrite)
+        typer.echo(f"wrote {figure}", err=as_json)
 
 
 @command
@@ -125,16 +152,3 @@ def simulate(
     scan, truth = simulated(phantom.value, snr, seed)
     write_scan(scan, output, truth, overwrite=overwrite)
     typer.echo(f"wrote {output}: {phantom.value} phantom, {snr:g} dB, seed {seed}")
-
-
-def _frames(text: str, count: int) -> list[int]:
-    """Read ``A:B``, ``A:B:C`` or ``N``. Raises `ValidationError` for anything else and for an empty choice."""
-    try:
-        numbers = [int(part) if part else None for part in text.split(":")]
-        one = len(numbers) == 1
-        chosen = [range(count)[numbers[0]]] if one else list(range(count)[slice(*numbers)])  # type: ignore[index]
-    except (ValueError, IndexError, TypeError):
-        chosen = []
-    if not chosen:
-        raise ValidationError(f"--frames {text}: expected A:B or one number within the scan's frames 0 .. {count - 1}")
-    return chosen
