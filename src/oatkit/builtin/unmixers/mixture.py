@@ -51,6 +51,11 @@ class Mixture:
         return tuple(one.name for one in self.chromophores)
 
     @property
+    def overdetermined(self) -> bool:
+        """Whether there are more different wavelengths than chromophores, so that not every spectrum can be fitted."""
+        return len(np.unique(self.spectra, axis=0)) > len(self.chromophores)
+
+    @property
     def condition(self) -> float:
         """By how much noise can grow on its way through the unmixing: the condition number of normalised spectra."""
         return float(np.linalg.cond(self.spectra / np.linalg.norm(self.spectra, axis=0)))

@@ -78,6 +78,14 @@ class Passes:
         held = self._held(state)
         return Settled(state, changes, bool(changes) and changes[-1] <= tolerance and held <= MOST_HELD, held)
 
+    def misfit(self, state: State) -> float:
+        """Return |p0 - K Gamma Phi E c| / |p0| over the body and all wavelengths."""
+        inside = self.model.inside
+        pressure = self.pressure[:, inside]
+        shown = np.divide(state.fitted, state.absorption, where=state.absorption != 0, out=np.zeros_like(state.fitted))
+        size = float(np.linalg.norm(pressure))
+        return float(np.linalg.norm(pressure - pressure * shown[:, inside])) / size if size > 0 else 0.0
+
     def _light(self, state: State) -> np.ndarray:
         return self.model.light(np.where(self.model.inside, state.fitted, 0.0), self.scattering)
 
