@@ -77,6 +77,40 @@ def test_the_saturation_of_deep_vessels_comes_out():
     assert deep(corrected()) < 0.2 * deep(raw)
 
 
+def test_the_spectra_tell_the_calibration():
+    """K comes out within 3 % of the true one, and the best of those tried misfits a third of the worst or less."""
+    found = FluenceCorrected(chromophores=NAMES).calibrate(problem(None))
+    assert found.value == pytest.approx(1.0, rel=0.03)
+    misfits = [misfit for _, misfit in found.curve]
+    assert min(misfits) < max(misfits) / 3
+
+
+def test_the_calibration_by_spectra_makes_up_for_a_wrong_scattering():
+    """With mu_s' 20 % too high, K by the spectra halves the error of the true K, and that of no correction at all."""
+    wrong = Optics(WAVELENGTHS, OPTICS.absorption_per_m, 1.2 * OPTICS.reduced_scattering_per_m)
+    unmixer = FluenceCorrected(chromophores=NAMES, probe=0.0)
+    found = unmixer.calibrate(problem(None, optics=wrong))
+    by_spectra, by_hand = (deep(unmixer.unmix(problem(k, optics=wrong))) for k in (found.value, 1.0))
+    assert by_spectra < 0.5 * by_hand
+    assert by_spectra < 0.5 * deep(Nnls(chromophores=NAMES).unmix(UnmixProblem(pressure())))
+
+
+def test_spectra_that_fit_anything_tell_no_calibration():
+    """Three chromophores at three wavelengths fit every spectrum: no K is found, and the note says why."""
+    few = Image(pressure().values[:3], "initial_pressure", "a.u.", GRID, WAVELENGTHS[:3])
+    found = FluenceCorrected(chromophores=NAMES).calibrate(
+        problem(None, few, tissue_optics("soft-tissue", WAVELENGTHS[:3]))
+    )
+    assert found.value is None
+    assert "fit any spectrum" in found.notes[0]
+
+
+def test_other_unmixers_say_that_they_cannot_calibrate():
+    """`nnls` refuses to find a calibration and names the unmixer that can."""
+    with pytest.raises(ValidationError, match=r"'nnls' finds no calibration.*'fluence-corrected'"):
+        Nnls().calibrate(problem(None))
+
+
 def test_a_stated_mean_takes_the_place_of_the_calibration():
     """Without K the mean absorption of the body is the one stated, exactly, and deep vessels are still twice nearer."""
     images = corrected(None)
@@ -197,9 +231,30 @@ def test_the_preset_unmixes_a_scan():
     arc = oatkit.plugin("forward_model", "arc")()
     scan = simulate_multispectral(BODY, arc, wavelengths_nm=(700, 800, 850), spacing_m=0.3e-3, pixels=211)
     changes = ["grid.pixels=60", "reconstruct.n_iterations=20", "unmix.passes=3", "preprocess.band-pass.high=1.5"]
-    result = oatkit.run(oatkit.Pipeline.load("multispectral", changes), scan)
+    pipeline = oatkit.Pipeline.load("multispectral", changes)
+    result = oatkit.run(pipeline, scan)
     so2 = result["so2"].values
     assert so2.shape == (1, 60, 60)
     assert np.isfinite(so2).sum() > 300
     assert (np.isnan(so2) | ((so2 >= 0) & (so2 <= 1))).all()
     assert result["so2"].history[-1]["use"] == "fluence-corrected"
+    assert any("the spectra tell no calibration" in note for note in result.warnings)
+
+
+def test_the_calibration_is_found_once_for_a_scan(tmp_path):
+    """With four wavelengths the preset finds K on the first frame and runs all with it; the result keeps the curve."""
+    from oatkit.simulate import simulate_multispectral
+
+    arc = oatkit.plugin("forward_model", "arc")()
+    scan = simulate_multispectral(
+        BODY, arc, wavelengths_nm=(700, 760, 800, 850), spacing_m=0.3e-3, pixels=211, frames=2
+    )
+    changes = ["grid.pixels=60", "reconstruct.n_iterations=20", "unmix.probe=0", "preprocess.band-pass.high=1.5"]
+    stored = oatkit.run_frames(oatkit.Pipeline.load("multispectral", changes), scan, tmp_path / "out.zarr")
+    found = stored.calibration_choice["calibration"]
+    assert stored.pipeline["absorption"]["calibration"] == pytest.approx(found)
+    assert len(stored.calibration_choice["tried"]) == len(stored.calibration_choice["misfit"]) > 5
+    for index in range(2):
+        assert stored.frame(index)["so2"].diagnostics["calibration"] == pytest.approx(found)
+    again = oatkit.run(oatkit.Pipeline.loads(oatkit.Pipeline.load("multispectral", changes).to_toml()), scan, frame=1)
+    assert (again["so2"].values == stored.frame(1)["so2"].values)[np.isfinite(again["so2"].values)].all()

@@ -30,6 +30,8 @@ ORDER = [
     {"frame_series", "manifest", "memo", "sheet"},
     {"store_writer", "figure", "kinetics", "motion_figure", "region_curves", "reconstruction", "region_table"},
     {"quantification", "focus"},
+    {"stepping"},
+    {"calibrating"},
     {"rules"},
     {"store", "engine", "describe", "focus_figure", "region_text", "spectra_figure"},
     {"batch", "convert", "export", "report", "summary", "progress"},

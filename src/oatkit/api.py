@@ -18,16 +18,16 @@ import pluggy
 from oatkit.data import Detectors, Geometry, Grid, Image, Optics, Scan, Signals
 from oatkit.errors import OatkitError, PluginError, ReadError, SolverError, ValidationError
 from oatkit.parameters import Parameters, param
-from oatkit.problem import Iterate, Problem, UnmixProblem
+from oatkit.problem import Calibration, Iterate, Problem, UnmixProblem
 from oatkit.regions import EllipseRegion, PolygonRegion, RectangleRegion, Region
 from oatkit.scale import Reference
 
 __all__ = [
-    "KINDS", "Detectors", "EllipseRegion", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image", "Iterate",
-    "OatkitError", "Optics", "Plugin", "PluginError", "PolygonRegion", "Preprocessor", "Problem", "Proximable",
-    "Quadratic", "ReadError", "Reader", "RectangleRegion", "Reference", "Region", "Regularizer", "Scan", "Segmenter",
-    "Signals", "Smooth", "Solver", "SolverError", "UnmixProblem", "Unmixer", "ValidationError", "Weight", "hookimpl",
-    "param",
+    "KINDS", "Calibration", "Detectors", "EllipseRegion", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image",
+    "Iterate", "OatkitError", "Optics", "Plugin", "PluginError", "PolygonRegion", "Preprocessor", "Problem",
+    "Proximable", "Quadratic", "ReadError", "Reader", "RectangleRegion", "Reference", "Region", "Regularizer", "Scan",
+    "Segmenter", "Signals", "Smooth", "Solver", "SolverError", "UnmixProblem", "Unmixer", "ValidationError", "Weight",
+    "hookimpl", "param",
 ]  # fmt: skip
 
 hookimpl = pluggy.HookimplMarker("oatkit")
@@ -187,6 +187,16 @@ class Unmixer(Plugin):
     @abstractmethod
     def unmix(self, problem: UnmixProblem) -> Mapping[str, Image]:
         """Return images by name: one for each chromophore, and what is derived from them."""
+
+    def calibrate(self, problem: UnmixProblem) -> Calibration:
+        """Return the calibration at which the images agree best with what the unmixer knows of spectra.
+
+        An unmixer need not be able to do this; then it raises `ValidationError`.
+        """
+        raise ValidationError(
+            f"unmixer '{self.name}' finds no calibration by the spectra; take 'fluence-corrected', or give the number "
+            "absorption.calibration"
+        )
 
 
 KINDS: Mapping[str, type[Plugin]] = {

@@ -99,8 +99,8 @@ def _texts(**texts: str) -> dict[str, np.bytes_]:
 
 
 def _provenance(result: Result) -> Any:
-    choices = ("requested", "pipeline", "weight_choice", "speed_choice")
-    keys = ("frame_index", "scan", *choices, "versions", "seconds", "warnings")
+    choices = ("requested", "pipeline", "weight_choice", "speed_choice", "calibration_choice")
+    keys = ("frame_index", "time_s", "scan", *choices, "versions", "seconds", "warnings")
     table = {key: getattr(result, key) for key in keys}
     images = {name: {"history": image.history, "diagnostics": image.diagnostics} for name, image in result.items()}
     return encode({**table, "images": images}, "result")

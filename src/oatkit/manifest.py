@@ -134,6 +134,7 @@ class Manifest(_Entry):
     scan: Plain
     weight_choice: Plain
     speed_choice: Plain = Field(default_factory=dict)
+    calibration_choice: Plain = Field(default_factory=dict)
     images: dict[ImageName, ImageEntry]
     records: dict[FrameKey, FrameEntry]
     """By the number of the frame in this result."""

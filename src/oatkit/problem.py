@@ -172,6 +172,23 @@ class Iterate:
     """Further numbers worth keeping with the image: the weight as applied, pixels set to zero, ..."""
 
 
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration that was found in the images of a scan, and how."""
+
+    value: float | None
+    """K Gamma: the signal that an absorption of 1/m gives at fluence 1, a.u. m; None where the images do not tell."""
+    curve: tuple[tuple[float, float], ...] = ()
+    """Calibrations that were tried, rising, and how badly each explains the images, relative to them."""
+    notes: tuple[str, ...] = ()
+    """What to know before trusting it."""
+
+    def table(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        tried, misfits = zip(*self.curve, strict=True) if self.curve else ((), ())
+        return {"calibration": self.value, "tried": list(tried), "misfit": list(misfits), "notes": list(self.notes)}
+
+
 @dataclass(frozen=True, eq=False)
 class UnmixProblem:
     """What an unmixer gets: the images so far, and what it needs to compute light anew.
@@ -188,6 +205,8 @@ class UnmixProblem:
     optics: Optics | None = None
     """mu_a that one assumes of the body, and its mu_s', at the wavelengths of the images."""
     calibration: float | None = None
-    """K Gamma: the signal that an absorption of 1/m gives at fluence 1, a.u. m; None where it is not known."""
+    """K Gamma; None where it is not known."""
+    calibrated_by: str = "hand"
+    """Where that comes from: "hand", or "spectra" of the same scan."""
     floor: float = 0.02
     """Least fluence that is divided by, relative to the largest in the body."""

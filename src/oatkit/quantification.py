@@ -77,8 +77,13 @@ def _absorption(pipeline: Pipeline, images: Images) -> Images:
 
 def _unmix(pipeline: Pipeline, images: Images) -> Images:
     assert pipeline.unmix is not None
+    return pipeline.unmix.unmix(unmix_problem(pipeline, images))
+
+
+def unmix_problem(pipeline: Pipeline, images: Images) -> UnmixProblem:
+    """Return what the unmixer of a pipeline gets."""
     pressure, table = images["initial_pressure"], pipeline.absorption or AbsorptionTable()
-    problem = UnmixProblem(
+    return UnmixProblem(
         pressure,
         images.get("absorption"),
         images.get("boundary"),
@@ -86,9 +91,9 @@ def _unmix(pipeline: Pipeline, images: Images) -> Images:
         pipeline.fluence,
         pipeline.optics.optics(pressure.wavelengths_nm) if pipeline.fluence else None,
         None if table.calibration is None else table.calibration * table.grueneisen,
+        table.calibrated_by,
         table.floor,
     )
-    return pipeline.unmix.unmix(problem)
 
 
 STEPS: Mapping[str, Callable[[Pipeline, Images], Images]] = {

@@ -67,6 +67,8 @@ class Result(Mapping[str, Image]):
     """How a rule chose the weight; empty where the weight was given as a number."""
     speed_choice: Mapping[str, Any] = field(default_factory=dict)
     """How the speed of sound was found by focus; empty where it was not."""
+    calibration_choice: Mapping[str, Any] = field(default_factory=dict)
+    """How the calibration was found by the spectra; empty where it was not."""
     stored: Frames | None = None
     """The folder that the result was loaded from."""
 

@@ -4,12 +4,14 @@ from dataclasses import dataclass
 
 from oatkit import weights
 from oatkit.blame import blame
+from oatkit.calibrating import asks_for_calibration, calibrate, calibrated
 from oatkit.data import Scan
 from oatkit.events import Listener, StepStarted, ignore
 from oatkit.focus import Focus, focus
 from oatkit.memo import Memo
 from oatkit.motion import Motion, find_motion
 from oatkit.pipeline import Pipeline
+from oatkit.problem import Calibration
 from oatkit.reconstruction import preprocess, problems, strongest
 
 
@@ -24,6 +26,8 @@ class Resolved:
     """How the weight was chosen; None where it was given as a number."""
     speed: Focus | None = None
     """How the speed of sound was chosen; None where it was not by focus."""
+    calibration: Calibration | None = None
+    """How the calibration was found; None where nobody asked."""
     motion: Motion | None = None
     """Which pulses are out of place; None where nobody asked."""
     left_out: tuple[int, ...] = ()
@@ -32,7 +36,7 @@ class Resolved:
     @property
     def notes(self) -> tuple[str, ...]:
         """What to know before trusting the choices."""
-        found = (self.speed, self.weight, self.motion)
+        found = (self.speed, self.weight, self.calibration, self.motion)
         left_out = (f"left out: frames {', '.join(map(str, self.left_out))} (motion)",) if self.left_out else ()
         return (*(note for part in found if part for note in part.notes), *left_out)
 
@@ -42,11 +46,11 @@ class Resolved:
 
 
 def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None, on_event: Listener = ignore) -> Resolved:
-    """Return the pipeline with its speed of sound and its weight chosen, and how they were chosen.
+    """Return the pipeline with its speed of sound, its weight and its calibration chosen, and how they were chosen.
 
-    Each rule runs once, on the scan's first frame and its strongest wavelength (the one of the largest signals),
-    whatever part of the scan is asked for; the speed of sound first, since the weight depends on it. Numbers are left
-    alone.
+    Each rule runs once, on the scan's first frame, whatever part of the scan is asked for, in this order, since each
+    depends on those before; the first two on its strongest wavelength (the one of the largest signals). Numbers are
+    left alone.
     """
     memo = Memo() if memo is None else memo
     motion = motion_in(pipeline, scan, memo, on_event)
@@ -55,14 +59,23 @@ def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None, on_event: 
     if pipeline.scan.speed_of_sound_m_s == "focus":
         speed = focus(pipeline, scan, memo=memo, on_event=on_event)
         ready = speed.apply(pipeline)
-    if not isinstance(getattr(pipeline.reconstruct, "weight", None), str):
-        return Resolved(ready, pipeline, None, speed, motion)
+    weight, calibration = None, None
+    if isinstance(getattr(pipeline.reconstruct, "weight", None), str):
+        ready, weight = _weighted(ready, scan, memo, on_event)
+    if asks_for_calibration(ready):
+        calibration = calibrate(ready, scan, memo, on_event)
+        ready = calibrated(ready, calibration)
+    return Resolved(ready, pipeline, weight, speed, calibration, motion)
+
+
+def _weighted(pipeline: Pipeline, scan: Scan, memo: Memo, on_event: Listener) -> tuple[Pipeline, weights.Choice | None]:
+    """Return the pipeline with its weight chosen, and how."""
     on_event(StepStarted("choosing the weight"))
-    clean = strongest(preprocess(ready, scan, 0, memo))
-    _, problem = next(problems(ready, clean, ready.grid.grid(), memo))
-    with blame(ready.reconstruct):
-        solver, choice = weights.resolve(ready.reconstruct, problem)
-    return Resolved(ready.with_solver(solver), pipeline, choice, speed, motion)
+    clean = strongest(preprocess(pipeline, scan, 0, memo))
+    _, problem = next(problems(pipeline, clean, pipeline.grid.grid(), memo))
+    with blame(pipeline.reconstruct):
+        solver, choice = weights.resolve(pipeline.reconstruct, problem)
+    return pipeline.with_solver(solver), choice
 
 
 def motion_in(pipeline: Pipeline, scan: Scan, memo: Memo, on_event: Listener = ignore) -> Motion | None:

@@ -111,6 +111,7 @@ class Store:
             time_s=record.time_s if record else None,
             weight_choice=manifest.weight_choice,
             speed_choice=manifest.speed_choice,
+            calibration_choice=manifest.calibration_choice,
             stored=stored,
         )
 

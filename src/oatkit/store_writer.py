@@ -28,7 +28,7 @@ from oatkit.manifest import (
 from oatkit.plain import encode
 from oatkit.result import Result
 
-_COMMON = ("pipeline", "requested", "versions", "scan", "weight_choice", "speed_choice")
+_COMMON = ("pipeline", "requested", "versions", "scan", "weight_choice", "speed_choice", "calibration_choice")
 """What is stored once for all frames, from the first one written."""
 
 

@@ -101,6 +101,10 @@ class AbsorptionTable(Parameters):
         unit="a.u. m",
         above=0,
     )
+    calibrated_by: Literal["hand", "spectra"] = param(
+        "hand",
+        'where the calibration comes from: "spectra" has the unmixer find it, once for a scan, if no number is given',
+    )
     grueneisen: float = param(1.0, "Grueneisen parameter of the body; 1 leaves it in the calibration", above=0)
     passes: int = param(
         1,

@@ -13,6 +13,7 @@ from oatkit.builtin.fluence.body import signed_distance
 from oatkit.builtin.fluence.cut_cells import CutCells
 from oatkit.builtin.fluence.diffusion import Medium, buried, diffusion_matrix, factorized, imbalance, wall_conductance
 from oatkit.builtin.fluence.fresnel import wall_factor
+from oatkit.builtin.fluence.shifted import shifted
 from oatkit.builtin.fluence.through_water import ThroughWater
 from oatkit.threads import for_each
 
@@ -98,13 +99,18 @@ class DiffusionFvm(ThroughWater):
         """Return the fluence of the cells where `light` is g at each piece of wall, and the worst imbalance."""
         conductance = wall_conductance(cells, medium.diffusion, self._wall_factor)
         source = self._source(cells, medium, light, conductance)
-        fluence, worst = np.zeros(len(cells.cells)), 0.0
-        for wave_number, weight in zip(*self._series(), strict=True):
-            absorption = medium.absorption + medium.diffusion * wave_number**2
-            term = factorized(diffusion_matrix(cells, medium.diffusion, absorption, conductance))(source)
-            worst = max(worst, imbalance(cells, source, absorption, conductance, term))
-            fluence += weight * term
-        return fluence, worst
+        wave_numbers, weights = self._series()
+        along = medium.diffusion * cells.volume
+        plane = diffusion_matrix(cells, medium.diffusion, medium.absorption, conductance)
+        if len(weights) == 1:
+            terms = factorized(plane)(source)[None]
+        else:
+            terms = shifted(plane, along, source, wave_numbers**2, medium.slowest_decay(cells))
+        worst = max(
+            imbalance(cells, source, medium.absorption + medium.diffusion * k**2, conductance, term)
+            for k, term in zip(wave_numbers, terms, strict=True)
+        )
+        return np.asarray(weights @ terms), worst
 
     def _source(self, cells: CutCells, medium: Medium, light: np.ndarray, conductance: np.ndarray) -> np.ndarray:
         """Return what comes into each cell, shape ``(cell,)``."""

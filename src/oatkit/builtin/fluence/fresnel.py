@@ -1,8 +1,11 @@
 """What the step of the refractive index does to diffuse light at the wall of the body."""
 
+from functools import cache
+
 import numpy as np
 
 
+@cache
 def wall_factor(index_body: float, index_couplant: float) -> float:
     r"""Return A = (1 + R_eff) / (1 - R_eff) of the Robin condition, from the Fresnel integrals of [Haskell1994]_.
 

@@ -3,16 +3,16 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 
-from oatkit.api import Image, UnmixProblem, ValidationError, param
+from oatkit.api import Calibration, Image, UnmixProblem, ValidationError, param
 from oatkit.builtin.unmixers.coarse_light import CoarseLight
 from oatkit.builtin.unmixers.mixture import Mixture
 from oatkit.builtin.unmixers.nonnegative import nonnegative
 from oatkit.builtin.unmixers.saturation import total_and_saturation
-from oatkit.builtin.unmixers.self_calibration import Calibration, by_spectra, by_spectra_near
+from oatkit.builtin.unmixers.self_calibration import by_spectra, by_spectra_near
 from oatkit.builtin.unmixers.settling import Passes, Settled
 from oatkit.builtin.unmixers.spectral import Fit, SpectralUnmixer
 from oatkit.plausible import implausible
@@ -28,16 +28,17 @@ class FluenceCorrected(SpectralUnmixer):
         c^{(n)} = \arg\min_{c \ge 0} \| E c - \mu_a^{(n)} \|
 
     until the absorption rests. The first light is that of the homogeneous body of ``[optics]``. K is
-    ``absorption.calibration`` times the Grueneisen parameter. Where it is not known, one number for all wavelengths
-    takes its place: with ``calibrate = "spectra"`` the one at which chromophores and light explain the pressure best
-    (light of the wrong strength leaves a colour that no chromophore has), with "mean" the one that makes the mean
-    absorption of the body what ``[optics]`` states. The former needs more wavelengths than chromophores, and gives way
-    to the latter, with a note, where the spectra do not tell.
+    ``absorption.calibration`` times the Grueneisen parameter. Where it is not known, it is set in each pass, one number
+    for all wavelengths, so that the mean absorption of the body is the one that ``[optics]`` states.
+
+    With ``absorption.calibrated_by = "spectra"``, K is found once for a scan: it is the one at which chromophores and
+    light explain the pressure best, for light of the wrong strength leaves a colour that no chromophore has. This needs
+    more wavelengths than chromophores. A wrong mu_s' is then made up for by K, in its effect on so2.
 
     In the light, absorption is kept below mu_s', where the diffusion of light ends. A K that is too low makes the
     absorption of deep vessels run away to that limit: ``diagnostics["diverged"]`` and a note say so.
     ``so2_sensitivity_scattering`` and ``so2_sensitivity_calibration`` show the change of so2 where mu_s', or K, is
-    higher by the share `probe`: what is not known well should not matter much.
+    higher by the share `probe`; where K comes from the spectra, it is found anew for the higher mu_s'.
 
     .. [Cox2006] B. T. Cox, S. R. Arridge, K. P. Koestli, P. C. Beard, Appl. Opt. 45, 1866 (2006),
        doi:10.1364/AO.45.001866.
@@ -49,11 +50,6 @@ class FluenceCorrected(SpectralUnmixer):
     passes: int = param(30, "at most as many passes between absorption and light", at_least=1, at_most=1000)
     tolerance: float = param(
         1e-3, "largest relative change of the absorption, at any wavelength, that counts as rest", above=0, below=1
-    )
-    calibrate: Literal["spectra", "mean"] = param(
-        "spectra",
-        "what stands in for an unknown absorption.calibration: that the spectra fit best, or that the mean absorption "
-        "of the body is the one of [optics]",
     )
     light_pixel: float = param(
         0.25, "pixel for changes of the light, rounded to whole pixels of the image", unit="mm", above=0
@@ -69,20 +65,25 @@ class FluenceCorrected(SpectralUnmixer):
         """
         mixture = self.mixture(problem.initial_pressure.wavelengths_nm)
         passes = self._passes(problem, mixture)
-        scale = self._scale(passes, mixture)
-        scaled = replace(passes, calibration=scale.value)
-        settled = scaled.settle(self.passes, self.tolerance)
-        images = self._images(problem, mixture, settled, scale)
+        settled = passes.settle(self.passes, self.tolerance)
+        images = self._images(problem, mixture, settled)
         if self.probe and "so2" in images:
-            images |= dict(self._sensitivities(passes, mixture, settled, images["so2"]))
+            refit = problem.calibrated_by == "spectra" and mixture.overdetermined
+            images |= dict(self._sensitivities(passes, mixture, settled, images["so2"], refit))
         return images
 
-    def _by_spectra(self, passes: Passes, mixture: Mixture) -> bool:
-        return passes.calibration is None and self.calibrate == "spectra" and mixture.overdetermined
-
-    def _scale(self, passes: Passes, mixture: Mixture) -> Calibration:
-        """Return the calibration to use; none where the mean absorption sets it in each pass."""
-        return by_spectra(passes) if self._by_spectra(passes, mixture) else Calibration(passes.calibration, ())
+    def calibrate(self, problem: UnmixProblem) -> Calibration:
+        """Return the K at which chromophores and light explain the pressure best, where the spectra tell one."""
+        mixture = self.mixture(problem.initial_pressure.wavelengths_nm)
+        if not mixture.overdetermined:
+            why = f"{len(mixture.names)} chromophores fit any spectrum of so few wavelengths"
+            return Calibration(None, (), (f"the spectra tell no calibration: {why}",))
+        passes = self._passes(problem, mixture)
+        found = by_spectra(replace(passes, calibration=None))
+        if found.value is None:
+            return replace(found, notes=("the spectra tell no calibration: they fit as well without any light lost",))
+        note = f"K = {found.value:.3g} a.u. m makes the spectra fit best, on the scan's first frame"
+        return replace(found, notes=(note,))
 
     def _solve(self, spectra: np.ndarray, data: np.ndarray) -> np.ndarray:
         return nonnegative(spectra, data)
@@ -100,9 +101,7 @@ class FluenceCorrected(SpectralUnmixer):
         fit = partial(self.fit, mixture)
         return Passes(pressure, model, fit, mixture.spectra, problem.calibration, problem.floor)
 
-    def _images(
-        self, problem: UnmixProblem, mixture: Mixture, settled: Settled, scale: Calibration
-    ) -> dict[str, Image]:
+    def _images(self, problem: UnmixProblem, mixture: Mixture, settled: Settled) -> dict[str, Image]:
         pressure, state = problem.initial_pressure, settled.state
         facts = {
             "passes": settled.passes,
@@ -110,8 +109,7 @@ class FluenceCorrected(SpectralUnmixer):
             "settled": settled.converged,
             "diverged": settled.diverged,
             "calibration": state.calibration,
-            "calibrated_by": _origin(problem, scale),
-            "calibration_curve": scale.curve,
+            "calibrated_by": "the mean of [optics]" if problem.calibration is None else problem.calibrated_by,
         }
 
         def image(values: np.ndarray, quantity: str, unit: str) -> Image:
@@ -120,18 +118,17 @@ class FluenceCorrected(SpectralUnmixer):
         absorption = image(state.absorption, "absorption", "1/m")
         fit = Fit(mixture, state.concentrations, absorption)
         made = {"fluence": image(state.light, "fluence", ""), "absorption": absorption}
-        return made | fit.images(self.so2_floor, facts, tuple(_notes(problem, settled, scale)))
+        return made | fit.images(self.so2_floor, facts, tuple(_notes(problem, settled)))
 
     def _sensitivities(
-        self, passes: Passes, mixture: Mixture, settled: Settled, so2: Image
+        self, passes: Passes, mixture: Mixture, settled: Settled, so2: Image, refit: bool
     ) -> Iterator[tuple[str, Image]]:
-        """Yield the change of so2 for a higher mu_s', K found anew if it was found, and for a higher K."""
-        factor, start = 1 + self.probe, settled.state
+        """Yield the change of so2 for a higher mu_s', with K found anew where `refit`, and for a higher K."""
+        factor, scale, start = 1 + self.probe, settled.state.calibration, settled.state.fitted
         scattering = replace(passes, scattering=factor)
-        if self._by_spectra(passes, mixture):
-            found = by_spectra_near(scattering, start.calibration, start)
-            scattering = replace(scattering, calibration=found.value)
-        calibration = replace(passes, calibration=factor * start.calibration)
+        if refit:
+            scattering = replace(scattering, calibration=by_spectra_near(scattering, scale, start).value)
+        calibration = replace(passes, calibration=factor * scale)
         for name, altered in (
             ("so2_sensitivity_scattering", scattering),
             ("so2_sensitivity_calibration", calibration),
@@ -144,28 +141,14 @@ class FluenceCorrected(SpectralUnmixer):
             yield name, Image(change, name, "", so2.grid, diagnostics=facts)
 
 
-def _origin(problem: UnmixProblem, scale: Calibration) -> str:
-    """Say where the calibration comes from."""
-    if problem.calibration is not None:
-        return "absorption.calibration"
-    return "the spectra" if scale.value is not None else "the mean absorption of the body in [optics]"
-
-
-def _notes(problem: UnmixProblem, settled: Settled, scale: Calibration) -> Iterator[str]:
+def _notes(problem: UnmixProblem, settled: Settled) -> Iterator[str]:
     assert problem.optics is not None
     assert problem.boundary is not None
     inside = problem.boundary.values[0] < 0
-    stated, found = (float(np.mean(v)) for v in (problem.optics.absorption_per_m, settled.state.fitted[:, inside]))
-    if scale.value is not None and problem.calibration is None:
-        yield (
-            f"no calibration is known: K = {scale.value:.3g} a.u. m makes the spectra fit best; the mean absorption of "
-            f"the body is then {found:.3g} 1/m ([optics] says {stated:.3g})"
-        )
-    elif problem.calibration is None:
-        why = ", since the spectra do not tell" if scale.curve else ""
+    if problem.calibration is None:
         yield (
             "no calibration is known: absorption and concentrations are scaled so that the mean absorption of the body "
-            f"is the {stated:.3g} 1/m of [optics]{why}"
+            f"is the {float(np.mean(problem.optics.absorption_per_m)):.3g} 1/m of [optics]"
         )
     yield from implausible(settled.state.fitted, problem.optics, inside)
     if settled.diverged:

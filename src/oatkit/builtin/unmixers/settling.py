@@ -50,6 +50,32 @@ class Settled:
         return not self.held <= MOST_HELD
 
 
+class Ahead:
+    """Looks ahead along the way that the passes take, by Anderson's mixing of the last two (J. ACM 12, 547, 1965)."""
+
+    def __init__(self) -> None:
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+        self._mixed: np.ndarray | None = None
+
+    def tell(self, seen: np.ndarray, found: np.ndarray) -> None:
+        """Take note of a pass: the absorption that its light saw, and the one that it found."""
+        before, self._last = self._last, (seen, found)
+        self._mixed = None if before is None else _mixed(*before, seen, found)
+
+    def of(self, found: np.ndarray) -> np.ndarray:
+        """Return what the light of the next pass should see: no negative absorption."""
+        return found if self._mixed is None else np.maximum(self._mixed, 0)
+
+
+def _mixed(seen0: np.ndarray, found0: np.ndarray, seen: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Return the mix of two passes in which, were they linear, what is seen and what is found would differ least."""
+    gap0, gap = np.nan_to_num(found0 - seen0), np.nan_to_num(found - seen)
+    turn = gap - gap0
+    size = float(np.vdot(turn, turn))
+    share = float(np.vdot(gap, turn)) / size if size > 0 else 0.0
+    return found - share * (found - found0)
+
+
 @dataclass(frozen=True)
 class Passes:
     """What does not change from pass to pass."""
@@ -68,13 +94,16 @@ class Passes:
     scattering: float = 1.0
     """Factor on mu_s'."""
 
-    def settle(self, most: int, tolerance: float, start: State | None = None) -> Settled:
-        """Make passes until the absorption rests or `most` are made."""
+    def settle(self, most: int, tolerance: float, start: np.ndarray | None = None) -> Settled:
+        """Make passes until the absorption rests or `most` are made; the first light sees the absorption `start`."""
         state = self._pass(self.model.homogeneous if start is None else self._light(start))
         changes: tuple[float, ...] = ()
+        ahead = Ahead()
         while len(changes) < most - 1 and not (changes and changes[-1] <= tolerance):
-            before, state = state, self._pass(self._light(state))
-            changes = (*changes, self._change(before.fitted, state.fitted))
+            seen = ahead.of(state.fitted)
+            state = self._pass(self._light(seen))
+            ahead.tell(seen, state.fitted)
+            changes = (*changes, self._change(seen, state.fitted))
         held = self._held(state)
         return Settled(state, changes, bool(changes) and changes[-1] <= tolerance and held <= MOST_HELD, held)
 
@@ -86,8 +115,8 @@ class Passes:
         size = float(np.linalg.norm(pressure))
         return float(np.linalg.norm(pressure - pressure * shown[:, inside])) / size if size > 0 else 0.0
 
-    def _light(self, state: State) -> np.ndarray:
-        return self.model.light(np.where(self.model.inside, state.fitted, 0.0), self.scattering)
+    def _light(self, absorption_per_m: np.ndarray) -> np.ndarray:
+        return self.model.light(np.where(self.model.inside, absorption_per_m, 0.0), self.scattering)
 
     def _pass(self, light: np.ndarray) -> State:
         inside = self.model.inside
