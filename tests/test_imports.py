@@ -19,7 +19,7 @@ ORDER = [
     {"csv_table", "data", "plot"},
     {
         "parameters", "checked", "label_files", "metrics", "optics", "plausible", "polygons", "scale", "scanfile",
-        "spectra", "words",
+        "spectra", "wavelengths", "words",
     },
     {"problem", "ipasc", "masking", "outlines", "regions", "tables"},
     {"absorption", "api", "motion"},
@@ -35,6 +35,7 @@ ORDER = [
     {"rules"},
     {"store", "engine", "describe", "focus_figure", "region_text", "spectra_figure"},
     {"batch", "convert", "export", "report", "summary", "progress"},
+    {"demo_oxygen"},
     {"demo", "paper"},
     {"cli"},
 ]  # fmt: skip

@@ -26,11 +26,11 @@ def run_frames(
 ) -> Result:
     """Run `pipeline` over `frames` (all unless said) and return the result that now lies in the folder `path`.
 
-    Rules (weight, speed of sound) are replaced and the operator built once. A frame that fails is recorded with its
-    reason and the rest goes on. Frames with a pulse out of place are no part of the result where the pipeline's table
-    ``[motion]`` says ``leave_out``; each frame's warnings list them. Raises `ValidationError` for a frame that does not
-    exist and where all are left out, `ResultError` where the result cannot be written, and the frame's own error where
-    every frame failed; then nothing is left at `path`.
+    Words that stand for numbers are replaced once, unless ``scan.rules`` asks otherwise, and the operator is built
+    once. A frame that fails is recorded with its reason and the rest goes on. Frames with a pulse out of place are no
+    part of the result where the pipeline's table ``[motion]`` says ``leave_out``; each frame's warnings list them.
+    Raises `ValidationError` for a frame that does not exist and where all are left out, `ResultError` where the result
+    cannot be written, and the frame's own error where every frame failed; then nothing is left at `path`.
     """
     chosen = list(range(scan.frames) if frames is None else frames)
     missing = [f for f in chosen if not 0 <= f < scan.frames]
@@ -41,10 +41,13 @@ def run_frames(
     left_out = _left_out(pipeline, scan, chosen, memo, on_event)
     chosen = [frame for frame in chosen if frame not in left_out]
     with StoreWriter(path, frames=len(chosen), source=scan.source, overwrite=overwrite) as writer:
-        resolved = replace(resolve(pipeline, scan, memo, on_event), left_out=left_out)
+        if pipeline.scan.rules == "scan":
+            resolved = replace(resolve(pipeline, scan, memo, on_event), left_out=left_out)
         failures = []
         for index, frame in enumerate(chosen):
             try:
+                if pipeline.scan.rules == "frame":
+                    resolved = replace(resolve(pipeline, scan, memo, on_event, frame), left_out=left_out)
                 result = run_resolved(resolved, scan, frame, memo, on_event)
             except OatkitError as error:
                 failures.append(error)

@@ -1,4 +1,4 @@
-"""The calibration of a scan by the spectra in it, found once, on its first frame."""
+"""The calibration of a scan by the spectra in it."""
 
 from oatkit.blame import blame
 from oatkit.data import Image, Scan
@@ -11,15 +11,15 @@ from oatkit.quantification import unmix_problem
 from oatkit.stepping import steps
 
 
-def calibrate(pipeline: Pipeline, scan: Scan, memo: Memo, on_event: Listener = ignore) -> Calibration:
-    """Return the calibration that the pipeline's unmixer finds on frame 0.
+def calibrate(pipeline: Pipeline, scan: Scan, frame: int, memo: Memo, on_event: Listener = ignore) -> Calibration:
+    """Return the calibration that the pipeline's unmixer finds on one frame.
 
     Raises `ValidationError` where the pipeline has no unmixer, or one that cannot.
     """
     if pipeline.unmix is None:
         raise ValidationError('[absorption].calibrated_by = "spectra" needs [unmix], which is missing')
     images: dict[str, Image] = {}
-    for event in steps(pipeline.model_copy(update={"absorption": None, "unmix": None}), scan, 0, memo):
+    for event in steps(pipeline.model_copy(update={"absorption": None, "unmix": None}), scan, frame, memo):
         on_event(event)
         if isinstance(event, StepDone):
             images |= event.images

@@ -1,10 +1,11 @@
-"""The demo: a simulated scan, three reconstructions, and one figure that compares them with the truth."""
+"""The demo: one simulated scan reconstructed three ways, and one at many wavelengths, each beside the truth."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 from oatkit.api import ForwardModel
 from oatkit.data import Image, Scan
+from oatkit.demo_oxygen import oxygen_files, run_oxygen_demo
 from oatkit.engine import run
 from oatkit.errors import ResultError, ValidationError
 from oatkit.memo import Memo
@@ -30,12 +31,12 @@ def simulated(phantom: str, snr_db: float, seed: int) -> tuple[Scan, Image]:
 
 
 def run_demo(folder: Path, overwrite: bool = False) -> Iterator[str]:
-    """Write scan, results and figure of the demo into `folder`; yield a line for each thing done.
+    """Write scans, results and figures of the demo into `folder`; yield a line for each thing done.
 
     Raises `ValidationError` where the folder holds a demo already, unless `overwrite`.
     """
     scan_file, figure, saved = (folder / name for name in ("scan.h5", "demo.png", f"{METHODS[-1]}.zarr"))
-    there = [str(path) for path in (scan_file, figure, saved) if path.exists()]
+    there = [str(path) for path in (scan_file, figure, saved, *oxygen_files(folder)) if path.exists()]
     if there and not overwrite:
         raise ValidationError(f"{there[0]}: exists already; choose another folder with -o or add --overwrite")
     from oatkit.figure import write_comparison  # matplotlib
@@ -61,6 +62,7 @@ def run_demo(folder: Path, overwrite: bool = False) -> Iterator[str]:
     title = "One simulated scan, three reconstructions"
     write_comparison(figure, panels, title, WHAT, overwrite)
     yield f"wrote {figure}"
+    yield from run_oxygen_demo(folder, overwrite)
 
 
 def scores(image: Image, truth: Image) -> list[str]:

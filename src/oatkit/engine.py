@@ -22,11 +22,11 @@ def run(
 ) -> Result:
     """Run `pipeline` over one frame of `scan` and return its images, with how they came about.
 
-    A weight or a speed of sound that is still the name of a rule is chosen first, on the scan's first frame. `on_event`
-    is shown every event. Raises an `OatkitError`.
+    Words that stand for numbers (see `oatkit.rules.resolve`) are replaced first. `on_event` is shown every event.
+    Raises an `OatkitError`.
     """
     memo = Memo() if memo is None else memo
-    return run_resolved(resolve(pipeline, scan, memo, on_event), scan, frame, memo, on_event)
+    return run_resolved(resolve(pipeline, scan, memo, on_event, frame), scan, frame, memo, on_event)
 
 
 def run_resolved(resolved: Resolved, scan: Scan, frame: int, memo: Memo, on_event: Listener) -> Result:

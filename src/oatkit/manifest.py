@@ -104,9 +104,11 @@ class FrameEntry(_Entry):
     seconds: Plain
     warnings: tuple[str, ...]
     images: dict[str, MadeEntry]
+    own: Plain = Field(default_factory=dict)
+    """Pipeline as run and choices of its numbers, where they are not those of the manifest."""
 
     @classmethod
-    def of(cls, result: Result) -> "FrameEntry":
+    def of(cls, result: Result, own: dict[str, Any]) -> "FrameEntry":
         """Describe `result`, in plain values only; raises `ResultError` where something cannot be stored."""
         made = {name: {"history": image.history, "diagnostics": image.diagnostics} for name, image in result.items()}
         frame = {
@@ -115,6 +117,7 @@ class FrameEntry(_Entry):
             "seconds": result.seconds,
             "warnings": result.warnings,
             "images": made,
+            "own": own,
         }
         return cls.model_validate_json(json.dumps(encode(frame, f"frame {result.frame_index}")))
 

@@ -45,33 +45,38 @@ class Resolved:
         return self.motion.of_frame(frame) if self.motion else ()
 
 
-def resolve(pipeline: Pipeline, scan: Scan, memo: Memo | None = None, on_event: Listener = ignore) -> Resolved:
+def resolve(
+    pipeline: Pipeline, scan: Scan, memo: Memo | None = None, on_event: Listener = ignore, frame: int = 0
+) -> Resolved:
     """Return the pipeline with its speed of sound, its weight and its calibration chosen, and how they were chosen.
 
-    Each rule runs once, on the scan's first frame, whatever part of the scan is asked for, in this order, since each
-    depends on those before; the first two on its strongest wavelength (the one of the largest signals). Numbers are
-    left alone.
+    Each rule runs on the scan's first frame, whatever part of the scan is asked for, or on `frame` where
+    ``scan.rules = "frame"`` asks for it; in this order, since each depends on those before; the first two on its
+    strongest wavelength (the one of the largest signals). Numbers are left alone.
     """
+    frame = frame if pipeline.scan.rules == "frame" else 0
     memo = Memo() if memo is None else memo
     motion = motion_in(pipeline, scan, memo, on_event)
     speed = None
     ready = pipeline
     if pipeline.scan.speed_of_sound_m_s == "focus":
-        speed = focus(pipeline, scan, memo=memo, on_event=on_event)
+        speed = focus(pipeline, scan, frame=frame, memo=memo, on_event=on_event)
         ready = speed.apply(pipeline)
     weight, calibration = None, None
     if isinstance(getattr(pipeline.reconstruct, "weight", None), str):
-        ready, weight = _weighted(ready, scan, memo, on_event)
+        ready, weight = _weighted(ready, scan, frame, memo, on_event)
     if asks_for_calibration(ready):
-        calibration = calibrate(ready, scan, memo, on_event)
+        calibration = calibrate(ready, scan, frame, memo, on_event)
         ready = calibrated(ready, calibration)
     return Resolved(ready, pipeline, weight, speed, calibration, motion)
 
 
-def _weighted(pipeline: Pipeline, scan: Scan, memo: Memo, on_event: Listener) -> tuple[Pipeline, weights.Choice | None]:
+def _weighted(
+    pipeline: Pipeline, scan: Scan, frame: int, memo: Memo, on_event: Listener
+) -> tuple[Pipeline, weights.Choice | None]:
     """Return the pipeline with its weight chosen, and how."""
     on_event(StepStarted("choosing the weight"))
-    clean = strongest(preprocess(pipeline, scan, 0, memo))
+    clean = strongest(preprocess(pipeline, scan, frame, memo))
     _, problem = next(problems(pipeline, clean, pipeline.grid.grid(), memo))
     with blame(pipeline.reconstruct):
         solver, choice = weights.resolve(pipeline.reconstruct, problem)

@@ -99,20 +99,23 @@ class Store:
 
     def _result(self, images: Mapping[str, Image], record: FrameEntry | None, stored: "Store | None" = None) -> Result:
         manifest = self.manifest
+        common = {
+            "pipeline": manifest.pipeline,
+            "scan": manifest.scan,
+            "weight_choice": manifest.weight_choice,
+            "speed_choice": manifest.speed_choice,
+            "calibration_choice": manifest.calibration_choice,
+        }
         return Result(
             images,
-            pipeline=manifest.pipeline,
             requested=manifest.requested,
             versions=manifest.versions,
-            scan=manifest.scan,
             seconds=record.seconds if record else {},
             warnings=record.warnings if record else (),
             frame_index=record.frame_index if record else 0,
             time_s=record.time_s if record else None,
-            weight_choice=manifest.weight_choice,
-            speed_choice=manifest.speed_choice,
-            calibration_choice=manifest.calibration_choice,
             stored=stored,
+            **{**common, **{key: own for key, own in (record.own if record else {}).items() if key in common}},
         )
 
 

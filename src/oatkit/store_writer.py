@@ -30,6 +30,8 @@ from oatkit.result import Result
 
 _COMMON = ("pipeline", "requested", "versions", "scan", "weight_choice", "speed_choice", "calibration_choice")
 """What is stored once for all frames, from the first one written."""
+_BY_FRAME = ("pipeline", "scan", "weight_choice", "speed_choice", "calibration_choice")
+"""What frames may have of their own, where the pipeline's ``scan.rules`` is "frame"."""
 
 
 class StoreWriter:
@@ -82,13 +84,13 @@ class StoreWriter:
         value outside the body), or cannot be written.
         """
         self._check_new(index)
-        record = FrameEntry.of(result)
         for name, image in result.items():
             _check_values(f"frame {index}: {name}", image)
         try:
             if not self._arrays:
                 self._begin(result)
             self._check_alike(index, result)
+            record = FrameEntry.of(result, self._own(result))
             for name, image in result.items():
                 self._arrays[name][index] = image.values
                 self._seal(chunk_file(name, index))
@@ -127,8 +129,14 @@ class StoreWriter:
             raise ResultError(
                 f"{self.path}: frame {index} differs from the first in images, shapes, wavelengths or units"
             )
-        if any(encode(getattr(result, key)) != self._common[key] for key in ("pipeline", "requested")):
+        same = ("requested",) if _rules_by_frame(result) else ("requested", "pipeline")
+        if any(encode(getattr(result, key)) != self._common[key] for key in same):
             raise ResultError(f"{self.path}: frame {index} comes from another pipeline than the first")
+
+    def _own(self, result: Result) -> dict[str, Any]:
+        """Return what this frame does not have in common with the first one."""
+        keys = _BY_FRAME if _rules_by_frame(result) else ()
+        return {key: own for key in keys if (own := encode(getattr(result, key))) != self._common[key]}
 
     def _seal(self, name: str) -> None:
         """Bring a file to the disk and note its checksum."""
@@ -157,6 +165,10 @@ class StoreWriter:
                 sync(Path(folder))
         except OSError as error:
             raise ResultError(f"{self.path}: could not be written: {error.strerror or error}") from error
+
+
+def _rules_by_frame(result: Result) -> bool:
+    return bool((result.requested.get("scan") or {}).get("rules") == "frame")
 
 
 def _checked(name: str) -> str:

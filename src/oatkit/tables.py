@@ -1,5 +1,6 @@
 """The tables of a pipeline file that are no plugins: scan, motion, grid, optics, absorption."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -9,6 +10,7 @@ from oatkit.data import Grid, Optics, Scan
 from oatkit.optics import read_optics
 from oatkit.parameters import Parameters, param
 from oatkit.spectra import TISSUES, tissue_optics
+from oatkit.wavelengths import choose_wavelengths, wavelength_notes
 
 
 class ScanTable(Parameters):
@@ -23,6 +25,11 @@ class ScanTable(Parameters):
     )
     start_time_us: float | None = param(
         None, "time of the first sample after the light pulse, in place of the file's", unit="us"
+    )
+    rules: Literal["scan", "frame"] = param(
+        "scan",
+        "whether words that stand for numbers (weight, speed of sound, calibration) are replaced once for the scan, on "
+        "its first frame, or anew on each frame",
     )
 
     def apply(self, scan: Scan) -> Scan:

@@ -23,7 +23,7 @@ from oatkit.spectra import TISSUES, Tissue
 from oatkit.spectra.tables import GRAM_PER_LITRE, GRAM_PER_MOL
 
 WHOLE_BLOOD_MOL_PER_M3 = 1e3 * GRAM_PER_LITRE / GRAM_PER_MOL
-"""Haemoglobin in whole blood, mol/m3."""
+"""Haemoglobin in whole blood, mol/m^3."""
 MEAN_REACH_M = 10.2e-3
 SKIN_M = 0.4e-3
 """Thickness of the skin along the way to the origin, m."""
@@ -174,9 +174,9 @@ class OxygenBody:
         return Image(values, "absorption", "1/m", grid, tuple(wavelengths_nm))
 
     def total_haemoglobin(self, grid: Grid) -> Image:
-        """Return the concentration of haemoglobin, mol/m3; zero outside of the body."""
+        """Return the concentration of haemoglobin, mol/m^3; zero outside of the body."""
         values = np.tensordot(self._haemoglobin, self.shares(grid), axes=1)
-        return Image(values, "total_haemoglobin", "mol/m3", grid)
+        return Image(values, "total_haemoglobin", "mol/m^3", grid)
 
     def so2(self, grid: Grid) -> Image:
         """Return which share of the haemoglobin in each pixel is oxygenated; NaN outside of the body."""
@@ -188,7 +188,7 @@ class OxygenBody:
 
     @property
     def _haemoglobin(self) -> np.ndarray:
-        """mol/m3, shape ``(tissue,)``."""
+        """mol/m^3, shape ``(tissue,)``."""
         return WHOLE_BLOOD_MOL_PER_M3 * np.array([tissue.blood_volume for tissue in self.tissues])
 
     def _draw_vessels(self, rng: np.random.Generator, n: int) -> tuple[Inclusion, ...]:
