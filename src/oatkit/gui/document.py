@@ -1,0 +1,161 @@
+"""A pipeline as the text that its author wrote: edited without losing comments, with undo and redo."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from oatkit.errors import ValidationError
+from oatkit.pipeline import Pipeline, preset
+
+
+class PipelineDocument:
+    """The text of a pipeline and the pipeline that it stands for.
+
+    An edit that gives no valid pipeline raises `ValidationError` and changes nothing. A step of ``preprocess`` is
+    addressed by its position.
+    """
+
+    def __init__(self, text: str, folder: Path = Path()) -> None:
+        self.folder = folder
+        self.pipeline = self._parsed(text)
+        self._texts, self._at = [text], 0
+        self._saved = text
+
+    @classmethod
+    def of_preset(cls, name: str) -> "PipelineDocument":
+        """Open a preset by its name."""
+        return cls(preset(name))
+
+    @classmethod
+    def open(cls, path: Path) -> "PipelineDocument":
+        """Open a pipeline file. Raises `ValidationError`."""
+        try:
+            return cls(path.read_bytes().decode("utf-8-sig"), path.parent)
+        except (OSError, UnicodeDecodeError) as error:
+            raise ValidationError(f"{path}: not a readable text file: {error}") from None
+
+    @property
+    def text(self) -> str:
+        """The text as it stands."""
+        return self._texts[self._at]
+
+    @property
+    def changed(self) -> bool:
+        """Whether something would be lost if it were closed."""
+        return self.text != self._saved
+
+    def save(self, path: Path) -> None:
+        """Write the text, byte for byte as it stands. Raises `ResultError` where it cannot be written."""
+        from oatkit.atomic import write_file
+
+        write_file(path, self.text.encode(), overwrite=True)
+        self._saved = self.text
+
+    def set(self, slot: str, key: str, value: Any, part: str = "", index: int | None = None) -> None:
+        """Set a parameter of a step; `part` names a nested plugin (a solver's regularizer), `index` a preprocess step.
+
+        Setting ``use`` takes another plugin, and drops the keys of the old one. A value of None removes the key.
+        """
+        document = self._document()
+        table = _table(document, slot, index)
+        table = _nested(table, part) if part else table
+        if key == "use":
+            for old in [name for name in table if name != "use"]:
+                del table[old]
+        if value is None:
+            table.pop(key, None)
+        else:
+            table[key] = _plain(value)
+        self._take(tomlkit.dumps(document))
+
+    def add(self, slot: str, use: str | None = None) -> None:
+        """Add a step to the end of ``preprocess``, or switch a later one on."""
+        document = self._document()
+        table = tomlkit.table() if use is None else tomlkit.item({"use": use})
+        if slot == "preprocess":
+            steps = document.setdefault("preprocess", tomlkit.aot())
+            steps.append(table)
+        else:
+            document[slot] = table
+        self._take(tomlkit.dumps(document))
+
+    def remove(self, slot: str, index: int | None = None) -> None:
+        """Remove a step."""
+        document = self._document()
+        if index is None:
+            document.pop(slot, None)
+        else:
+            del document[slot][index]
+        self._take(tomlkit.dumps(document))
+
+    def move(self, index: int, to: int) -> None:
+        """Move a step of ``preprocess``."""
+        document = self._document()
+        steps = [dict(step) for step in document["preprocess"]]
+        steps.insert(to, steps.pop(index))
+        array = tomlkit.aot()
+        for step in steps:
+            array.append(tomlkit.item(step))
+        document["preprocess"] = array
+        self._take(tomlkit.dumps(document))
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is an edit to take back."""
+        return self._at > 0
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is an edit to make again."""
+        return self._at < len(self._texts) - 1
+
+    def undo(self) -> None:
+        """Take the last edit back, if there is one."""
+        self._go(self._at - 1)
+
+    def redo(self) -> None:
+        """Make an edit again that was taken back, if there is one."""
+        self._go(self._at + 1)
+
+    def _go(self, at: int) -> None:
+        if 0 <= at < len(self._texts):
+            self._at = at
+            self.pipeline = self._parsed(self.text)
+
+    def _take(self, text: str) -> None:
+        if text != self.text:
+            self.pipeline = self._parsed(text)
+            self._texts = [*self._texts[: self._at + 1], text]
+            self._at += 1
+
+    def _parsed(self, text: str) -> Pipeline:
+        return Pipeline.loads(text, "pipeline", self.folder)
+
+    def _document(self) -> tomlkit.TOMLDocument:
+        try:
+            return tomlkit.parse(self.text)
+        except TOMLKitError as error:
+            raise ValidationError(f"pipeline: not valid TOML: {error}") from None
+
+
+def _table(document: Any, slot: str, index: int | None) -> Any:
+    if index is not None:
+        return document[slot][index]
+    if slot not in document:
+        document[slot] = tomlkit.table()
+    return document[slot]
+
+
+def _nested(table: Any, part: str) -> Any:
+    if not isinstance(table.get(part), Mapping):
+        table[part] = tomlkit.inline_table()
+    return table[part]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,105 @@
+"""What the windows show and change: a scan, a pipeline, a frame, and what came out. No Qt, no napari."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from oatkit.data import Image, Scan
+from oatkit.engine import run_resolved
+from oatkit.errors import ValidationError
+from oatkit.events import Event, StepDone, StepIterate, StepStarted
+from oatkit.gui.document import PipelineDocument
+from oatkit.gui.job import Job
+from oatkit.memo import Memo
+from oatkit.pipeline import Pipeline
+from oatkit.quantification import STEPS
+from oatkit.reading import read
+from oatkit.result import Result
+from oatkit.rules import resolve
+
+FIRST_STEPS = ("preprocess", "reconstruct")
+SLOTS = ("preprocess", "forward", "reconstruct", *STEPS)
+"""The steps of a pipeline in their order."""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A run came to its end."""
+
+    result: Result
+
+
+@dataclass
+class Session:
+    """One scan and one pipeline, worked on together."""
+
+    document: PipelineDocument = field(default_factory=lambda: PipelineDocument.of_preset("maxent"))
+    scan: Scan | None = None
+    frame: int = 0
+    memo: Memo = field(default_factory=Memo)
+    result: Result | None = None
+    """Of the last run that came to its end."""
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """The pipeline as it stands."""
+        return self.document.pipeline
+
+    def open_scan(self, path: str | Path) -> Scan:
+        """Open a scan and go to its first frame. Raises `ReadError`."""
+        self.scan, self.frame, self.result = read(path), 0, None
+        return self.scan
+
+    def go_to_frame(self, frame: int) -> None:
+        """Take another frame of the scan. Raises `ValidationError` where there is none."""
+        if self.scan is None or not 0 <= frame < self.scan.frames:
+            raise ValidationError(
+                f"frame {frame}: the scan has frames 0 .. {(self.scan.frames if self.scan else 0) - 1}"
+            )
+        self.frame = frame
+
+    def run(self, up_to: str | None = None) -> Job:
+        """Start a job that yields the events of running the pipeline over the frame, and `Finished` at its end.
+
+        `up_to` names the last step to run. What was computed before and has not changed is not computed again. Raises
+        `ValidationError` where there is no scan.
+        """
+        scan, frame, pipeline = self._scan(), self.frame, _up_to(self.pipeline, up_to)
+
+        def work(job: Job) -> Iterator[Any]:
+            def tell(event: Event) -> None:
+                job.check()
+                job.show(event)
+
+            resolved = resolve(pipeline, scan, self.memo, tell, frame)
+            job.check()
+            result = run_resolved(resolved, scan, frame, self.memo, tell)
+            self.result = result
+            yield Finished(result)
+
+        return Job(work).start()
+
+    def _scan(self) -> Scan:
+        if self.scan is None:
+            raise ValidationError("no scan is open: drag one into the window, or open the sample")
+        return self.scan
+
+
+def _up_to(pipeline: Pipeline, last: str | None) -> Pipeline:
+    """Return the pipeline without the steps after `last`."""
+    if last is None:
+        return pipeline
+    later = SLOTS[SLOTS.index(last) + 1 :]
+    return pipeline.model_copy(update={slot: None for slot in later if slot in STEPS})
+
+
+def images_of(event: Event) -> dict[str, Image]:
+    """Return what a step made; nothing for other events."""
+    return dict(event.images) if isinstance(event, StepDone) else {}
+
+
+def step_of(event: Event) -> str:
+    """Return which step an event belongs to."""
+    assert isinstance(event, StepStarted | StepIterate | StepDone)
+    return event.step

@@ -1,0 +1,107 @@
+"""The state behind the windows: the numbers of the engine, jobs that always end, and nothing computed twice."""
+
+import time
+
+import pytest
+
+import oatkit
+from oatkit.errors import SolverError, ValidationError
+from oatkit.events import StepDone, StepIterate
+from oatkit.gui.document import PipelineDocument
+from oatkit.gui.job import Job
+from oatkit.gui.session import Finished, Session
+
+SMALL = {"pixels": 32, "field_of_view_mm": 9.0}
+
+
+def small_session(scan, preset="lsqr"):
+    """A session on a small scan."""
+    session = Session(PipelineDocument.of_preset(preset), scan)
+    for key, value in SMALL.items():
+        session.document.set("grid", key, value)
+    return session
+
+
+def finished(job):
+    """What a job has yielded, once it has ended well."""
+    assert job.wait(60)
+    assert job.failure is None, job.failure
+    return job.drain()
+
+
+def test_the_session_gives_the_numbers_of_the_engine(small_scan):
+    """A run in a session equals `oatkit.run` to the last bit, and ends with its result."""
+    session = small_session(small_scan)
+    items = finished(session.run())
+    assert isinstance(items[-1], Finished)
+    expected = oatkit.run(session.pipeline, small_scan)
+    assert (items[-1].result["initial_pressure"].values == expected["initial_pressure"].values).all()
+    assert session.result is items[-1].result
+
+
+def test_only_what_changed_runs_again(small_scan):
+    """After a change of the segmenter no solver takes a step."""
+    session = small_session(small_scan)
+    session.document.add("segment", "radial")
+    assert any(isinstance(item, StepIterate) for item in finished(session.run()))
+    session.document.set("segment", "blur", 0.5)
+    again = finished(session.run())
+    assert not any(isinstance(item, StepIterate) for item in again)
+    assert "boundary" in [name for item in again if isinstance(item, StepDone) for name in item.images]
+
+
+def test_a_run_may_end_at_a_step(small_scan):
+    """Run to here: the steps after it are not run."""
+    session = small_session(small_scan)
+    session.document.add("segment", "radial")
+    items = finished(session.run(up_to="reconstruct"))
+    assert [item.step for item in items if isinstance(item, StepDone)] == ["preprocess", "reconstruct"]
+
+
+def test_a_cancelled_run_leaves_a_usable_session(small_scan):
+    """A run of many steps ends within a second of being cancelled, without failure; the next run works."""
+    session = small_session(small_scan, "maxent")
+    session.document.set("reconstruct", "tolerance", 1e-12)
+    job = session.run()
+    while not any(isinstance(item, StepIterate) for item in job.drain()):
+        time.sleep(0.005)
+    start = time.perf_counter()
+    job.cancel()
+    assert job.wait(5)
+    assert time.perf_counter() - start < 1
+    assert job.failure is None
+    session.document.undo()
+    assert isinstance(finished(session.run())[-1], Finished)
+
+
+@pytest.mark.parametrize(
+    "error", [RuntimeError("out of luck"), SolverError("no luck today"), SystemExit(3), KeyError("x")]
+)
+def test_whatever_a_plugin_raises_is_a_sentence_and_a_traceback(error):
+    """A job never raises: its failure holds one sentence and the details to copy."""
+
+    def explode(job):
+        yield 1
+        raise error
+
+    job = Job(explode).start()
+    assert job.wait(5)
+    assert job.drain() == [1]
+    assert str(error) in job.failure.sentence
+    assert "Traceback" in job.failure.details
+
+
+def test_without_a_scan_it_says_what_to_do():
+    """Running without a scan is refused with the way to get one, and so is a frame that does not exist."""
+    with pytest.raises(ValidationError, match="open the sample"):
+        Session().run()
+    with pytest.raises(ValidationError, match="frame 3"):
+        Session().go_to_frame(3)
+
+
+def test_opening_a_scan_goes_to_its_first_frame(small_scan_file):
+    """A scan that is opened replaces the last one and its result."""
+    session = Session(frame=1)
+    session.open_scan(small_scan_file)
+    assert (session.frame, session.result) == (0, None)
+    assert session.scan.frames == 2
