@@ -15,7 +15,7 @@ import numpy as np
 import oatkit
 from oatkit import Pipeline, Scan, plugin
 from oatkit.focus import focus
-from oatkit.focus_metrics import METRICS
+from oatkit.focus.metrics import METRICS
 from oatkit.simulate import msot_geometry, simulate_scan
 
 TRUE_M_S = 1503.7

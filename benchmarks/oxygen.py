@@ -23,9 +23,9 @@ import oatkit
 from fluence import cpu_model
 from oatkit import Memo, Pipeline, Result, Scan
 from oatkit.data import Grid, Image
-from oatkit.optics import COLUMNS
 from oatkit.simulate import Inclusion, OxygenBody, illuminate, oxygen_phantom, simulate_scan
 from oatkit.spectra import tissue_optics
+from oatkit.spectra.optics import COLUMNS
 from oatkit.tables import AbsorptionTable
 from oatkit.threads import thread_count
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from oatkit import Grid, Image, ValidationError
-from oatkit.absorption import absorption
+from oatkit.quantification.absorption import absorption
 from oatkit.tables import AbsorptionTable
 
 GRID = Grid((20, 24), 2e-4)

@@ -26,6 +26,7 @@ COMMANDS = (
     "plugins",
     "describe",
     "simulate",
+    "convert",
     "export",
     "verify",
     "roi",
@@ -106,6 +107,63 @@ def test_export_writes_each_format(stored, tmp_path, suffix):
     assert run_oatkit("export", str(stored[0]), str(file), "--overwrite").returncode == 0
 
 
+def test_convert_writes_what_the_ending_asks_for(small_scan_file, tmp_path):
+    """IPASC holds the same signals and says what it lacks; a file is not replaced unasked, nor an ending guessed."""
+    file = tmp_path / "scan.hdf5"
+    done = run_oatkit("convert", str(small_scan_file), str(file))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"wrote {file}\nnote: ")
+    ours, theirs = oatkit.read(small_scan_file), oatkit.read(file)
+    assert theirs.reader == "ipasc"
+    assert (np.asarray(theirs.signals[:]) == np.asarray(ours.signals[:])).all()
+    again = run_oatkit("convert", str(small_scan_file), str(file))
+    assert (again.returncode, "exists" in again.stderr) == (2, True)
+    assert run_oatkit("convert", str(small_scan_file), str(file), "--overwrite").returncode == 0
+    unknown = run_oatkit("convert", str(small_scan_file), str(tmp_path / "scan.mat"))
+    assert unknown.returncode == 2
+    assert ".h5" in unknown.stderr
+
+
+def test_simulate_writes_the_frames_asked_for(tmp_path):
+    """Each has noise of its own; the file holds the truth."""
+    from oatkit.scanfile import read_truths
+
+    file = tmp_path / "disc.h5"
+    done = run_oatkit("simulate", "disc", "-o", str(file), "--frames", "2", "--snr", "20")
+    assert done.returncode == 0, done.stderr
+    signals = oatkit.read(file).signals
+    assert signals.shape[0] == 2
+    assert (signals[0] != signals[1]).any()
+    assert list(read_truths(file)) == ["initial_pressure"]
+
+
+def test_simulate_oxygen_writes_scan_and_truths(tmp_path, monkeypatch):
+    """Twelve wavelengths, and pressure, so2 and haemoglobin of the body of this seed, here in coarse light."""
+    from functools import partial
+
+    from typer.testing import CliRunner
+
+    import oatkit.simulate
+    from oatkit.cli import app
+    from oatkit.scanfile import read_truths
+
+    monkeypatch.setattr("oatkit.simulate.illuminate", partial(oatkit.simulate.illuminate, spacing_m=0.5e-3))
+    file = tmp_path / "oxygen.h5"
+    done = CliRunner().invoke(app, ["simulate", "oxygen", "-o", str(file), "--seed", "3"])
+    assert done.exit_code == 0, done.output
+    clear = [word for word in done.output.split() if word.startswith("fluence.")]
+    fluence = oatkit.Pipeline.load("multispectral", clear).fluence
+    assert (fluence.ring_radius, fluence.band_width) == (None, 1e3 * oatkit.simulate.multispectral.BAND.width_m)
+    scan, truths = oatkit.read(file), read_truths(file)
+    assert scan.wavelengths_nm == tuple(range(680, 901, 20))
+    assert [image.values.shape for image in truths.values()] == [(12, 200, 200), (1, 200, 200), (1, 200, 200)]
+    body, grid = oatkit.simulate.OxygenBody.draw(3), truths["so2"].grid
+    assert grid == oatkit.Pipeline.load("multispectral").grid.grid()
+    assert truths["so2"] == body.so2(grid)
+    assert truths["total_haemoglobin"] == body.total_haemoglobin(grid)
+    assert (truths["initial_pressure"].values[:, body.which(grid.y_m[:, None], grid.x_m[None, :]) >= 0] > 0).all()
+
+
 def test_verify_finds_a_flipped_bit(stored, tmp_path):
     """`verify` exits with 0 for a sound result and with 4 for one with a flipped bit."""
     import shutil
@@ -135,10 +193,14 @@ BAD_CALLS = {
     "grid over the detectors": (["run", "maxent", "SCAN", "-o", "x.zarr", "--set", "grid.field_of_view_mm=40"], 2),
     "a list of steps": (["run", "maxent", "SCAN", "-o", "x.zarr", "--set", "preprocess.use=offset"], 2),
     "deep nesting": (["run", "maxent", "SCAN", "-o", "x.zarr", "--set", f"grid.pixels={'[' * 50_000}"], 2),
+    "no such wavelength": (["run", "lsqr", "SCAN", "-o", "x.zarr", "--set", "scan.wavelengths_nm=[650]"], 2),
     "no such frame": (["run", "maxent", "SCAN", "-o", "x.zarr", "--frames", "9"], 2),
     "output exists": (["run", "maxent", "SCAN", "-o", "text.txt"], 2),
     "no such plugin": (["describe", "maxnt"], 2),
     "unknown suffix": (["export", "RESULT", "x.bmp"], 2),
+    "a page that is no page": (["report", "RESULT", "-o", "x.txt"], 2),
+    "a result as a scan": (["info", "RESULT"], 4),
+    "a folder as a scan": (["info", "."], 4),
 }
 
 
@@ -154,6 +216,20 @@ def test_bad_input_gets_a_sentence_and_an_exit_code(what, small_scan_file, store
     assert done.stderr.strip()
     assert "Traceback" not in done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["empty.msot", "text.txt"]
+
+
+def test_warnings_of_the_log_look_like_all_others_and_steer_no_terminal(stored, tmp_path):
+    """A region that is left out is said on stderr behind the program's name, whatever the file is called."""
+    path = tmp_path / "red\x1b[31m.iannotation"
+    rois = [{"type": "Segment", "points": ["Point(0, 0)"]}, {"pos": "Point(0, 0)"}]
+    path.write_text(json.dumps({"Annotations": [{"ROIList": rois}]}))
+    done = run_oatkit("roi", str(stored[0]), "-r", str(path), "--json")
+    assert done.returncode == 0
+    assert {row["region"] for row in json.loads(done.stdout)} == {"iAnnotation_0/1"}
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("oatkit: ")
+    assert line.isprintable()
+    assert "straight line" in line
 
 
 def test_a_failed_first_frame_leaves_the_second(small_scan, tmp_path):

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import h5py
@@ -21,6 +22,7 @@ from oatkit.export import export
 from oatkit.figure import compare, image_figure, write_comparison
 from oatkit.page import png
 from oatkit.result import Result
+from oatkit.sheet import MARGIN, WIDEST, Panel, scale_of, sheet
 from results import GRID, WAVELENGTHS_NM, make_result, pressure, write_frames
 
 RED = (255, 0, 0)
@@ -320,10 +322,97 @@ assert {key for key in before if before[key] != after[key]} == set()
 
 
 def test_a_large_picture_of_many_wavelengths_wraps() -> None:
-    """Six wavelengths make a row of four and one of two, in one scale: six panels and two colour bars."""
-    wavelengths = (700.0, 730.0, 760.0, 800.0, 850.0, 900.0)
-    values = np.repeat(pressure().values[:1], 6, axis=0)
+    """Eight wavelengths make a row of six and one of two, in one scale: eight panels and two colour bars."""
+    wavelengths = (700.0, 730.0, 740.0, 750.0, 760.0, 800.0, 850.0, 900.0)
+    values = np.repeat(pressure().values[:1], 8, axis=0)
     figure = image_figure(Result({"p": replace(pressure(), values=values, wavelengths_nm=wavelengths, diagnostics={})}))
     tops = sorted({round(axes.get_position().y0, 6) for axes in figure.axes})
-    assert len(figure.axes) == 8
+    assert len(figure.axes) == 10
     assert len(tops) == 2
+
+
+def chromophores() -> Result:
+    """Images that belong to no wavelength beside one that does; so2 has no value in a corner."""
+    rng = np.random.default_rng(4)
+    so2 = np.where(np.add.outer(range(24), range(30)) < 9, np.nan, rng.uniform(0.2, 0.3, (24, 30)))
+    planes = {
+        "oxyhaemoglobin": (rng.random((24, 30)), "mol/m^3"),
+        "so2": (so2, ""),
+        "so2_sensitivity_scattering": (rng.normal(0, 0.01, (24, 30)), ""),
+    }
+    made = {
+        name: Image(values.astype(np.float32), name, unit, GRID, diagnostics={"fitted_to": "absorption"})
+        for name, (values, unit) in planes.items()
+    }
+    return Result({"initial_pressure": pressure(), **made})
+
+
+def test_chromophores_keep_unit_axes_and_undefined_pixels(tmp_path: Path) -> None:
+    """In HDF5 and OME-TIFF each is one plane of no wavelength, named as it is, with its unit; NaN stays NaN."""
+    result = chromophores()
+    export(result, tmp_path / "x.h5")
+    export(result, tmp_path / "x.ome.tif")
+    with h5py.File(tmp_path / "x.h5") as file, tifffile.TiffFile(tmp_path / "x.ome.tif") as tiff:
+        series = {one.name: one for one in tiff.series}
+        described = {one["Name"]: one for one in tifffile.xml2dict(tiff.ome_metadata)["OME"]["Image"]}
+        for name in ("oxyhaemoglobin", "so2"):
+            image = result[name]
+            assert file[name].shape == (1, 24, 30)
+            assert file[name].attrs["wavelengths_nm"].shape == (0,)
+            assert file[name].attrs["unit"].decode() == image.unit
+            assert np.array_equal(file[name][()], image.values, equal_nan=True)
+            assert series[name].axes == "YX"
+            assert np.array_equal(series[name].asarray(), image.values[0, ::-1], equal_nan=True)
+            assert described[name]["Pixels"]["Channel"]["Name"] == name
+            assert f"{name} in {image.unit or 'no unit'}" in described[name]["Description"]
+        assert np.isnan(file["so2"][0, 0, 0])
+        assert not np.isnan(file["so2"][0, -1, -1])
+
+
+def test_saturation_is_drawn_from_0_to_1() -> None:
+    """Equal so2 has equal colour in every figure, that of its place in 0 .. 1, however little of it an image uses."""
+    so2 = chromophores()["so2"]
+    scale = scale_of(so2, so2.values)
+    assert (scale.normalise.vmin, scale.normalise.vmax) == (0, 1)
+    narrow = scale_of(so2, so2.values[:, :2])
+    values = np.array([[0.0, 0.25, 1.0]])
+    none = np.zeros(values.shape, bool)
+    assert np.array_equal(scale.paint(values, none), narrow.paint(values, none))
+    brightness = scale.paint(np.linspace(0, 1, 9)[None], np.zeros((1, 9), bool))[0, :, :3] @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(brightness) > 0).all()
+
+
+def test_a_sensitivity_is_negative_by_nature() -> None:
+    """It has white at zero, equal ends, no red for negative pixels, and none of them counted."""
+    result = chromophores()
+    image = result["so2_sensitivity_scattering"]
+    scale = scale_of(image, image.values)
+    assert scale.normalise.vmin == -scale.normalise.vmax < 0
+    assert np.allclose(scale.paint(np.zeros((1, 1)), np.zeros((1, 1), bool))[0, 0, :3], 1, atol=0.05)
+    figure = image_figure(Result({"so2_sensitivity_scattering": image}))
+    assert not any("negative" in text.get_text() for text in figure.texts)
+    assert not Panel("", image).negative.any()
+
+
+def test_images_of_no_wavelength_share_a_row() -> None:
+    """They stand below those of many wavelengths, whatever their order in the result, and do not overlap."""
+    images = chromophores().images
+    mixed = {name: images[name] for name in ("oxyhaemoglobin", "initial_pressure", "so2", "so2_sensitivity_scattering")}
+    boxes = [axes.get_position() for axes in image_figure(Result(mixed)).axes]
+    pictures = [box for box in boxes if box.width > 0.05]
+    rows = sorted({round(box.y0, 6) for box in pictures})
+    assert [sum(round(box.y0, 6) == row for box in pictures) for row in rows] == [3, 2]
+    lower = sorted((box for box in pictures if round(box.y0, 6) == rows[0]), key=lambda box: box.x0)
+    assert all(left.x1 < right.x0 for left, right in pairwise(lower))
+
+
+@pytest.mark.parametrize("columns", [30, 200, 700, 1300])
+def test_a_row_is_no_wider_than_a_page(columns: int) -> None:
+    """Many wavelengths of any size wrap before the widest row is passed, unless one panel alone passes it."""
+    wavelengths = tuple(700.0 + 10 * i for i in range(7))
+    grid = Grid((4, columns), 1e-5)
+    image = Image(np.ones((7, 4, columns)), "initial_pressure", "a.u.", grid, wavelengths)
+    figure = sheet([[Panel(f"panel {i}", image, wavelength=i) for i in range(7)]])
+    assert _texts(figure).count("panel") == 7
+    alone = sheet([[Panel("", image)]])
+    assert figure.bbox.width <= max(WIDEST + 2 * MARGIN, alone.bbox.width)

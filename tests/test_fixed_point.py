@@ -1,10 +1,12 @@
 """Absorption and light that belong together: fed back, the absorption that made the data comes out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from oatkit import Grid, Image, Optics, plugin
-from oatkit.fixed_point import fixed_point
+from oatkit.quantification.fixed_point import fixed_point
 from oatkit.simulate import Body, star_body
 from oatkit.tables import AbsorptionTable
 
@@ -100,3 +102,18 @@ def test_a_wrong_calibration_is_said(calibration, sentence):
     """A calibration too low drives absorption to its limit, one too high far below the stated mean; both are said."""
     found, _ = fed_back(15, calibration)
     assert any(sentence in note for note in found.diagnostics["notes"])
+
+
+def test_one_calibration_holds_at_all_wavelengths():
+    """Without K, only the mean over all wavelengths need be known: a body half as absorbing comes out as that."""
+    body, pressure, boundary, _ = star()
+    fine = Grid((60 * FINER, 60 * FINER), GRID.pixel_size_m / FINER)
+    half = replace(body.absorption(fine), values=body.absorption(fine).values / 2)
+    light = MODEL.fluence(body.boundary(fine), Optics((800.0,), half.values, SCATTERING))
+    dimmer = averaged(replace(half, values=half.values * light.values))
+    both = Image(np.stack([pressure.values[0], dimmer]), "initial_pressure", "a.u.", GRID, (700.0, 800.0))
+    mean = 0.75 * float(body.absorption(GRID).values[0][boundary.values[0] < 0].mean())
+    optics = Optics(both.wavelengths_nm, np.full(2, mean), np.repeat(SCATTERING, 2))
+    found, _ = fixed_point(AbsorptionTable(passes=15), MODEL, optics, both, MODEL.fluence(boundary, optics), boundary)
+    tubes = found.values[:, deep_tube()].mean(1)
+    assert tubes[1] / tubes[0] == pytest.approx(0.5, rel=0.03)

@@ -7,8 +7,8 @@ import pytest
 
 import oatkit
 from oatkit.api import Grid, Image, Optics, UnmixProblem
-from oatkit.builtin.unmixers.coarse_light import CoarseLight
 from oatkit.errors import ValidationError
+from oatkit.light import CoarseLight
 from oatkit.simulate import OxygenBody, illuminate
 from oatkit.spectra import CHROMOPHORES, tissue_optics
 

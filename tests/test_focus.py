@@ -13,8 +13,8 @@ from oatkit import Geometry, Memo, Pipeline, plugin
 from oatkit.api import Detectors
 from oatkit.errors import ValidationError
 from oatkit.focus import focus
-from oatkit.focus_figure import focus_figure
-from oatkit.focus_metrics import METRICS, TRUSTED
+from oatkit.focus.figure import focus_figure
+from oatkit.focus.metrics import METRICS, TRUSTED
 from oatkit.page import png
 from oatkit.simulate import arc_detectors, msot_geometry, simulate_scan, star
 

@@ -6,10 +6,10 @@ import pytest
 
 import oatkit
 from oatkit.errors import SolverError, ValidationError
-from oatkit.events import StepDone, StepIterate
+from oatkit.events import StepDone
 from oatkit.gui.document import PipelineDocument
 from oatkit.gui.job import Job
-from oatkit.gui.session import Finished, Session
+from oatkit.gui.session import Converging, Finished, Session
 
 SMALL = {"pixels": 32, "field_of_view_mm": 9.0}
 
@@ -43,10 +43,10 @@ def test_only_what_changed_runs_again(small_scan):
     """After a change of the segmenter no solver takes a step."""
     session = small_session(small_scan)
     session.document.add("segment", "radial")
-    assert any(isinstance(item, StepIterate) for item in finished(session.run()))
+    assert any(isinstance(item, Converging) for item in finished(session.run()))
     session.document.set("segment", "blur", 0.5)
     again = finished(session.run())
-    assert not any(isinstance(item, StepIterate) for item in again)
+    assert not any(isinstance(item, Converging) for item in again)
     assert "boundary" in [name for item in again if isinstance(item, StepDone) for name in item.images]
 
 
@@ -63,7 +63,7 @@ def test_a_cancelled_run_leaves_a_usable_session(small_scan):
     session = small_session(small_scan, "maxent")
     session.document.set("reconstruct", "tolerance", 1e-12)
     job = session.run()
-    while not any(isinstance(item, StepIterate) for item in job.drain()):
+    while not any(isinstance(item, Converging) for item in job.drain()):
         time.sleep(0.005)
     start = time.perf_counter()
     job.cancel()

@@ -13,7 +13,7 @@ from oatkit.builtin.readers.ithera import IThera
 from oatkit.builtin.readers.oatkit_hdf5 import OatkitHdf5
 from oatkit.errors import ReadError
 from oatkit.hostile import inside, parse_xml, printable
-from oatkit.scanfile import MARKER, read_truth, write_scan
+from oatkit.scanfile import MARKER, read_truth, read_truths, write_scan
 from test_reader_hdf5 import a_scan, a_truth
 
 SECRET = "root:x:0:0"
@@ -405,6 +405,61 @@ def test_links_are_refused(scan_file, way, name):
             read_truth(scan_file)
     else:
         assert "links are refused" in refused(scan_file)
+
+
+def forged(path, **changes):
+    """Replace entries of the description of a scan file; `None` removes one."""
+    with h5py.File(path, "r+") as file:
+        about = json.loads(file["about"][0])
+        about = {key: value for key, value in {**about, **changes}.items() if value is not None}
+        del file["about"]
+        file["about"] = np.array([json.dumps(about).encode()])
+    return path
+
+
+KNOWN = {"quantity": "so2", "unit": "", "pixel_size_m": 1e-4, "centre_m": [0, 0], "wavelengths_nm": []}
+FORGED_TRUTHS = {
+    "no table": (["so2"], "expected a table 'truth_images'"),
+    "no dataset": ({"so2": KNOWN}, "found nothing"),
+    "a group": ({"": KNOWN}, "expected a dataset"),
+    "no description": ({"same": None}, "the description of a truth is unusable"),
+    "no text": ({"same": {**KNOWN, "quantity": ["so2"]}}, "the description of a truth is unusable"),
+    "no pixel": ({"same": {**KNOWN, "pixel_size_m": 0}}, "pixel_size_m"),
+    "one quantity twice": ({"same": {**KNOWN, "quantity": "initial_pressure"}}, "one truth for each quantity"),
+}
+
+
+@pytest.mark.parametrize(("table", "sentence"), FORGED_TRUTHS.values(), ids=FORGED_TRUTHS)
+def test_forged_truths_are_refused(scan_file, table, sentence):
+    """In one sentence that says where, whatever the description promises."""
+    with h5py.File(scan_file, "r+") as file:
+        file.create_group("truth_images")["same"] = np.zeros((1, 3, 3))
+    with pytest.raises(ReadError, match=sentence) as error:
+        read_truths(forged(scan_file, truth_images=table))
+    assert scan_file.name in one_sentence(error)
+
+
+@pytest.mark.parametrize("way", [external_link, dangling, cycle])
+def test_links_to_further_truths_are_refused(scan_file, way):
+    """As they are everywhere else in the file."""
+    with h5py.File(scan_file, "r+") as file:
+        file.create_group("truth_images")
+        way(file, "truth_images/so2")
+    with pytest.raises(ReadError, match="links are refused"):
+        read_truths(forged(scan_file, truth_images={"so2": KNOWN}))
+
+
+def test_truths_are_limited_together(scan_file, monkeypatch):
+    """Ten names of one dataset count as ten: a small file cannot fill the memory."""
+    with h5py.File(scan_file, "r+") as file:
+        group = file.create_group("truth_images")
+        for number in range(10):
+            group[f"q{number}"] = group["q0"] if number else np.zeros((1, 3, 3))
+    table = {f"q{number}": {**KNOWN, "quantity": f"q{number}"} for number in range(10)}
+    assert len(read_truths(forged(scan_file, truth_images=table))) == 11
+    monkeypatch.setattr("oatkit.scanfile.MAX_ARRAY_BYTES", read_truth(scan_file).values.nbytes + 9 * 72)
+    with pytest.raises(ReadError, match="q9"):
+        read_truths(scan_file)
 
 
 @pytest.mark.parametrize("way", [external_storage, virtual])

@@ -14,29 +14,30 @@ SOURCE = Path(oatkit.__file__).parent
 HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg", "h5py", "skimage", "tifffile", "typer")
 
 ORDER = [
-    {"errors", "names", "vectors", "laplacian", "compiled", "running_statistics"},
-    {"content", "atomic", "threads", "plain", "page", "hostile", "focus_metrics"},
-    {"csv_table", "data", "plot"},
+    {"checkpoint", "compiled", "errors", "laplacian", "names", "vectors"},
+    {"content", "atomic", "threads", "plain", "page", "hostile"},
+    {"csv_cell", "data", "plot"},
     {
-        "parameters", "checked", "label_files", "metrics", "optics", "plausible", "polygons", "scale", "scanfile",
+        "parameters", "checked", "label_files", "light", "metrics", "polygons", "scale", "scanfile",
         "spectra", "wavelengths", "words",
     },
-    {"problem", "ipasc", "masking", "outlines", "regions", "tables"},
-    {"absorption", "api", "motion"},
-    {"blame", "events", "fixed_point", "hookspecs", "simulate"},
+    {"problem", "ipasc", "masking", "outlines", "shapes", "tables"},
+    {"api"},
+    {"blame", "events", "hookspecs", "simulate"},
     {"registry", "weights"},
     {"pipeline", "reading"},
-    {"provenance", "region_files", "result"},
-    {"frame_series", "manifest", "memo", "sheet"},
-    {"store_writer", "figure", "kinetics", "motion_figure", "region_curves", "reconstruction", "region_table"},
+    {"provenance", "result"},
+    {"memo", "sheet"},
+    {"figure", "kinetics", "motion", "reconstruction", "regions"},
     {"quantification", "focus"},
     {"stepping"},
     {"calibrating"},
     {"rules"},
-    {"store", "engine", "describe", "focus_figure", "region_text", "spectra_figure"},
+    {"store", "engine", "describe"},
     {"batch", "convert", "export", "report", "summary", "progress"},
     {"demo_oxygen"},
     {"demo", "paper"},
+    {"gui"},
     {"cli"},
 ]  # fmt: skip
 """Layers of modules from the ground up: a module imports only from layers below its own."""
@@ -45,8 +46,8 @@ UPWARDS = {("result", "store")}
 """The one exception: `Result.save` is promised, and imports the store when it is called."""
 
 FOR_BUILTINS = {
-    "api", "compiled", "content", "data", "errors", "hostile", "ipasc", "label_files", "laplacian", "masking",
-    "parameters", "plausible", "polygons", "regions", "scanfile", "spectra", "threads", "vectors",
+    "api", "checkpoint", "compiled", "content", "data", "errors", "hostile", "ipasc", "label_files", "laplacian",
+    "light", "masking", "parameters", "polygons", "scanfile", "spectra", "threads", "vectors",
 }  # fmt: skip
 
 

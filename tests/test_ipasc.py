@@ -23,6 +23,10 @@ from oatkit.ipasc import write_ipasc
 from test_reader_hdf5 import a_scan, in_memory
 
 WRITTEN = "kept in /meta_data/"
+CORNERS = 1e-3 * np.array([[0, 0, 20], [4, 0, 20], [4, 2, 20], [1, 3, 20]])
+"""Of a region of interest, each (x, y, z), m."""
+BOX = np.array([-0.001, 0.003, 0.002, 0.004, 0.01, 0.03])
+"""Another one: x, y and z from and to, m."""
 
 
 def bare_scan(frames=3, wavelengths=2) -> Scan:
@@ -183,7 +187,7 @@ class Adapter(pacfish.BaseAdapter):
             Tags.SIZES: np.array(scan.signals.shape)[[2, 3, 1, 0]],
             Tags.OVERALL_GAIN: 1.0,
             Tags.FREQUENCY_DOMAIN_FILTER: np.array([5e4, 7e6]),
-            Tags.REGIONS_OF_INTEREST: {"a": {"outline": np.zeros((3, 3))}},
+            Tags.REGIONS_OF_INTEREST: {"a": {"outline": CORNERS}, "b": {"box": BOX}},
         }.get(metadatum)
 
 
@@ -195,9 +199,13 @@ def test_we_read_what_pacfish_writes(tmp_path, shape):
     found = oatkit.read(path)
     assert same_but_rounded(found, scan)
     assert (found.reader, found.name) == ("ipasc", "scan")
-    for words in ("first sample", "impulse response", "frequency_domain_filter", "regions of interest", "responses"):
+    for words in ("first sample", "impulse response", "frequency_domain_filter", "responses"):
         assert any(words in note for note in found.notes), words
     assert not any("overall_gain" in note or "sizes" in note for note in found.notes)
+    outline, box = oatkit.read_regions(path)
+    assert (outline.name, box.name) == ("a/outline", "b/box")
+    assert np.array_equal(outline.vertices_m, CORNERS[:, [1, 0]])
+    assert np.array_equal(box.outline_m, [[0.002, -0.001], [0.002, 0.003], [0.004, 0.003], [0.004, -0.001]])
 
 
 @pytest.mark.parametrize("scan", [a_scan(), a_scan("f4", 1), bare_scan(1, 1), bare_scan(2, 2)])
@@ -295,6 +303,57 @@ def test_matlab_files_are_turned_around(tmp_path, shape):
     assert np.array_equal(scan.geometry.detectors.positions_m, ARC[:, [1, 0]])
     assert scan.geometry.sampling_rate_hz == 40e6
     assert scan.name == "of MATLAB"
+
+
+def test_regions_of_matlab_are_turned_around(tmp_path):
+    """Points that MATLAB has written as (3, n), and a box as a column, are the regions of Python's file."""
+    path = write_as_matlab_does(tmp_path / "scan.hdf5", samples())
+    with h5py.File(path, "r+") as file:
+        file["meta_data/regions_of_interest/outline"] = CORNERS.T
+        file["meta_data/regions_of_interest/box"] = BOX[:, None]
+    box, outline = oatkit.read_regions(path)
+    assert np.array_equal(outline.vertices_m, CORNERS[:, [1, 0]])
+    assert box.centre_m == (0.003, 0.001)
+
+
+@pytest.mark.parametrize("across", range(3))
+def test_regions_lie_in_the_plane_of_the_detectors(tmp_path, across):
+    """Whatever the axis across it: a region on the detectors' arc has their coordinates."""
+    points = np.insert(ARC[:, :2], across, 0.0, axis=1)
+    path = write(tmp_path / "scan.hdf5", points=points, **{"regions_of_interest/arc": points})
+    (region,) = oatkit.read_regions(path)
+    assert np.array_equal(region.vertices_m, oatkit.read(path).geometry.detectors.positions_m)
+
+
+ODD_REGIONS = {
+    "two points": np.zeros((2, 3)),
+    "a box or a triangle": np.zeros((3, 2)),
+    "a number": np.array(3.0),
+    "in mm": 1e3 * CORNERS,
+    "no number": CORNERS * np.nan,
+    "a box without width": np.array([0.001, 0.001, 0.0, 0.002, 0.0, 0.0]),
+    "nothing": b"None",
+}
+
+
+@pytest.mark.parametrize("case", ODD_REGIONS)
+def test_a_region_that_makes_no_sense_leaves_the_others(tmp_path, caplog, case):
+    """It is named in the log, and all others are read."""
+    regions = {"regions_of_interest/a": CORNERS, "regions_of_interest/odd": ODD_REGIONS[case]}
+    path = write(tmp_path / "scan.hdf5", **regions)
+    assert [region.name for region in oatkit.read_regions(path)] == ["a"]
+    (record,) = caplog.records
+    assert "region 'odd'" in record.getMessage()
+
+
+def test_regions_are_read_through_no_link(tmp_path):
+    """Neither a region nor the group of them may lead into another file."""
+    for name in ("regions_of_interest", "regions_of_interest/a", "regions_of_interest/group/a"):
+        path = write(tmp_path / "scan.hdf5")
+        with h5py.File(path, "r+") as file:
+            file[f"meta_data/{name}"] = h5py.ExternalLink("/etc/passwd", "/x")
+        with pytest.raises(ReadError, match="links are refused"):
+            oatkit.read_regions(path)
 
 
 def test_texts_as_character_codes_are_read(tmp_path):

@@ -272,10 +272,11 @@ def test_a_broken_annotation_is_refused_and_the_scan_is_not(tmp_path, case):
 
 
 @pytest.mark.parametrize("case", NO_SHAPES)
-def test_a_broken_region_is_refused_by_its_name(tmp_path, case):
-    """With what was expected."""
+def test_a_broken_region_leaves_the_others(tmp_path, caplog, case):
+    """The log names it and says what was expected; those before and after it are read."""
     entry, words = NO_SHAPES[case]
-    msot = annotate(tmp_path, {"pos": "Point(0, 0)"}, entry)
-    with pytest.raises(ReadError, match=words) as error:
-        IThera().regions(msot)
-    assert "iAnnotation_0/1" in str(error.value)
+    msot = annotate(tmp_path, {"pos": "Point(0, 0)"}, entry, {"pos": "Point(0.001, 0)"})
+    assert [region.name for region in IThera().regions(msot)] == ["iAnnotation_0/0", "iAnnotation_0/2"]
+    (record,) = caplog.records
+    assert "iAnnotation_0/1" in record.getMessage()
+    assert words in record.getMessage()

@@ -9,11 +9,10 @@ import pytest
 
 import oatkit
 from oatkit import Grid, Image, Result, ValidationError
-from oatkit.kinetics import contrast_kinetics, gas_challenge
-from oatkit.manifest import FrameEntry
-from oatkit.region_curves import curves_csv, region_curves
+from oatkit.kinetics import contrast_kinetics, curve_text, curves_csv, gas_challenge, region_curves
+from oatkit.kinetics.statistics import Moments, Response
 from oatkit.regions import EllipseRegion, MaskRegion, RectangleRegion
-from oatkit.running_statistics import Moments, Response
+from oatkit.store.manifest import FrameEntry
 from packages import run_oatkit
 from results import make_result, write_frames
 
@@ -97,14 +96,14 @@ def test_a_failed_frame_does_not_count(tmp_path):
     values = [*np.ones((2, *GRID.shape)), "no luck", 2 * np.ones(GRID.shape)]
     made = gas_challenge(series(tmp_path, values), range(2), range(2, 4))
     assert (made["so2_change"].values == 1).all()
-    assert made.warnings == ("baseline: 2 frames", "challenge: 1 frames; frames 2 failed and do not count")
+    assert made.warnings == ("baseline: 2 frames", "challenge: 1 frame; failed, and not counted: frame 2")
 
 
 WRONG = {
-    "both": (([0, 1], [1, 2]), "frames 1 belong to the baseline, too"),
+    "both": (([0, 1], [1, 2]), "in the baseline, too: frame 1; choose"),
     "empty": (([], [1, 2]), "baseline: no frame is chosen"),
     "beyond": (([0], [9]), "challenge: no frame 9; the result has frames 0 .. 3"),
-    "failed": (([0], [3]), "challenge: all of its frames failed: 3"),
+    "failed": (([0], [3]), "challenge: all of its frames failed: frame 3"),
     "unknown": (([0], [1], "s02"), "no image 's02'; did you mean 'so2'"),
 }
 
@@ -181,9 +180,9 @@ def test_without_times_frames_are_counted(tmp_path):
 def test_a_baseline_needs_something_after_it(tmp_path):
     """Where no frame is later than the baseline there is no kinetics; earlier ones are noted."""
     result = series(tmp_path, np.ones((3, *GRID.shape)))
-    with pytest.raises(ValidationError, match="no frame is later than its last one"):
+    with pytest.raises(ValidationError, match=r"frame 2 \(by the times of the scan; the result has 3 frames\)"):
         contrast_kinetics(result, "so2", [2])
-    assert "frames 0 are no later than the baseline" in contrast_kinetics(result, "so2", [1]).warnings[1]
+    assert "no later than the baseline, and not counted: frame 0" in contrast_kinetics(result, "so2", [1]).warnings[1]
 
 
 REGIONS = (
@@ -219,6 +218,15 @@ def test_curves_are_written_as_a_table(tmp_path):
     assert np.allclose([float(row["change"]) for row in rows], curves[0].change, rtol=1e-8)
 
 
+def test_no_name_in_curves_becomes_a_formula_or_steers_the_terminal(tmp_path):
+    """What a spreadsheet would run gets an apostrophe in the CSV; controls become question marks on the screen, too."""
+    everywhere = [EllipseRegion(name, (0.0, 0.0), (0.1, 0.1)) for name in ("=1+1", "\t@SUM(A1)", "red\x1b[31m")]
+    curves = region_curves(series(tmp_path, noise(3)), "so2", [0], everywhere)
+    rows = list(csv.DictReader(io.StringIO(curves_csv(curves))))
+    assert list(dict.fromkeys(row["region"] for row in rows)) == ["'=1+1", "'@SUM(A1)", "red?[31m"]
+    assert all(curve_text(curve).isprintable() for curve in curves)
+
+
 def test_a_region_without_a_pixel_is_refused(tmp_path):
     """A region beside the image is a sentence, not a curve of NaN."""
     result = series(tmp_path, noise(3))
@@ -241,7 +249,7 @@ def test_what_is_made_can_be_stored(tmp_path):
 
 def test_a_manifest_without_times_is_read():
     """What was stored before frames knew their times is read, with no time."""
-    table = json.loads(FrameEntry.of(make_result(time_s=3.5)).model_dump_json())
+    table = json.loads(FrameEntry.of(make_result(time_s=3.5), {}).model_dump_json())
     assert table.pop("time_s") == 3.5
     assert FrameEntry.model_validate_json(json.dumps(table)).time_s is None
 

@@ -8,28 +8,37 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from oatkit import ResultError, ValidationError
+from oatkit import Grid, Image, ResultError, ValidationError
 from oatkit.page import png
 from oatkit.paper import ranking
 from oatkit.paper.experiments import EXPERIMENTS
 from oatkit.paper.fig6 import low_share, magnitude
+from oatkit.paper.fig7 import SETTING as SPECTRAL_SETTING
+from oatkit.paper.fig7 import STOPPED, fig7, spectra_of
 from oatkit.paper.methods import L2, MAXENT
 from oatkit.paper.outcome import Outcome
 from oatkit.paper.running import run_experiment
 from oatkit.paper.setting import Setting
+from oatkit.paper.spectral import BELOW_SKIN_M, OFF_VESSELS_M, SpectralMouse, lowest_square
 from oatkit.paper.star import Star
 from oatkit.paper.sweep import sweep
 from oatkit.plot import MOST_INSIDE, Curve, Plot
+from oatkit.scanfile import write_scan
+from oatkit.shapes import MaskRegion
 from oatkit.sheet import Panel, sheet
-from oatkit.simulate import mouse_body
+from oatkit.simulate import OxygenBody, mouse_body
 
 SMALL = {"pixels": 48, "fine_pixels": 113, "detectors": 48, "per_decade": 1}
+OTHER_SIZE = {
+    "fig2": {"pixels": 80, "fine_pixels": 191, "detectors": 96},
+    "fig7": {"wavelengths_nm": (680.0, 760.0, 900.0)},
+}
 SINGLE = [name for name in EXPERIMENTS if name != "ranking"]
 
 
 def small(name: str) -> Setting:
     """The setting of an experiment at a size of seconds."""
-    size = SMALL | {"pixels": 80, "fine_pixels": 191, "detectors": 96} if name == "fig2" else SMALL
+    size = SMALL | OTHER_SIZE.get(name, {})
     return replace(import_module(f"oatkit.paper.{name}").SETTING, **size)
 
 
@@ -113,6 +122,65 @@ def test_both_starts_end_at_one_certified_optimum(outcomes):
     assert all(float(row[4]) <= 1e-4 for row in certified)
     assert int(printed[0][2].replace(",", "")) > 0
     assert float(printed[0][3].rstrip("%")) > 0
+
+
+@pytest.mark.slow
+def test_spectra_without_negative_values_come_from_the_non_negative_methods(outcomes):
+    """In fig7, thresholded L2 and MaxEnt have no negative pixel in either region; signed L2 has, in the tissue."""
+    end = outcome("fig7", outcomes)
+    rows = list(zip(*(column(end, name) for name in ("region", "method", "negative pixels")), strict=True))
+    shares = {(region, method): float(share.split()[0]) for region, method, share in rows}
+    assert len(shares) == 10
+    assert {key for key, share in shares.items() if share > 0} == {("tissue", "L2"), ("tissue", STOPPED)}
+
+
+@pytest.mark.slow
+def test_a_real_scan_without_regions_is_read_at_its_rim_and_core(tmp_path):
+    """Given a scan of two wavelengths without regions, fig7 shows rim and core of the body, and claims no truth."""
+    path = tmp_path / "scan.h5"
+    write_scan(SpectralMouse(replace(small("fig7"), wavelengths_nm=(700.0, 850.0))).scan, path)
+    *_, end = fig7(replace(small("fig7"), scan=path))
+    assert {(region, known) for region, *_, known in end.table[1:]} == {("rim", "not known"), ("core", "not known")}
+    assert set(column(end, "wavelengths with a mean below 0")) <= {f"{n} of 2" for n in range(3)}
+
+
+def test_a_scan_of_one_wavelength_has_no_spectra(small_scan_file):
+    """Fig7 says that a scan was taken at one wavelength only, and what to do, before anything is reconstructed."""
+    with pytest.raises(ValidationError, match=r"small.h5: it was taken at 700 nm only; .* leave the scan out"):
+        next(fig7(replace(SPECTRAL_SETTING, scan=small_scan_file)))
+
+
+def test_the_square_of_tissue_is_the_lowest_of_all():
+    """No square off skin and vessels has a lower mean, and this one keeps its distance from both."""
+    grid, body = Grid((60, 60), 0.4e-3), OxygenBody.draw(1)
+    image = Image(np.random.default_rng(0).normal(size=(3, 60, 60)), "initial_pressure", "", grid, (700, 800, 900))
+    boundary = body.boundary(grid)
+    found = lowest_square(image, boundary, body.vessels).mask(grid)
+    near = boundary.values[0] > -BELOW_SKIN_M
+    for vessel in body.vessels:
+        near |= np.hypot(*np.meshgrid(*(grid.x_m - vessel.centre_m[1], grid.y_m - vessel.centre_m[0]))) <= (
+            vessel.half_axes_m[0] + OFF_VESSELS_M
+        )
+    means = [
+        image.values[:, i : i + 5, j : j + 5].mean()
+        for i, j in np.ndindex(56, 56)
+        if not near[i : i + 5, j : j + 5].any()
+    ]
+    assert found.sum() == 25
+    assert not near[found].any()
+    assert image.values[:, found].mean() == pytest.approx(min(means), abs=1e-12)
+
+
+def test_spectra_are_in_the_order_of_wavelengths():
+    """Whatever the order of the scan, a spectrum rises in wavelength, each mean, spread and share at its own."""
+    grid, values = Grid((2, 1), 1e-3), np.array([[[3.0], [5.0]], [[-1.0], [1.0]]])
+    image, everywhere = Image(values, "initial_pressure", "", grid, (800, 700)), np.ones((2, 1), bool)
+    found = spectra_of({"an image": image}, [MaskRegion("all", everywhere, grid)])["all", "an image"]
+    assert found.wavelengths_nm.tolist() == [700, 800]
+    assert found.mean.tolist() == [0, 4]
+    assert found.std.tolist() == [1, 1]
+    assert found.negative_share == 0.25
+    assert found.below_zero == "0 of 2"
 
 
 @pytest.mark.slow

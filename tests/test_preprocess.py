@@ -256,6 +256,16 @@ def test_the_mouse_saturates_in_its_transient_only(mouse_scan):
     assert not Channels(after=0.0).process(scan).valid.all()
 
 
+def test_zeros_are_dead_though_they_lie_at_a_limit():
+    """A channel of zeros in whole numbers without a sign is called dead; one that often touches a limit, saturated."""
+    signals = np.random.default_rng(0).integers(100, 900, (1, 4, 400)).astype("u2")
+    signals[0, 1] = 0
+    signals[0, 2, 200:300] = 65_535
+    signals[0, 3, 200:300] = 0
+    scan = Channels().process(scan_of(signals))
+    assert scan.notes[-1] == "channels: not used at 700 nm: 1 dead; 2, 3 saturated."
+
+
 def test_channels_invalid_before_stay_so():
     """The step only ever takes away, and does not judge others by them."""
     signals = noise()

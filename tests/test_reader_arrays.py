@@ -318,29 +318,40 @@ def test_time_zero_of_the_response_is_where_the_file_says(tmp_path, size):
     for centre in range(size):
         rest = ARC.format(count=5) + f'[impulse_response]\nfile = "irf.npy"\ncentre = {centre}\n'
         response = PlainArray().read(saved(tmp_path, rest=rest)).geometry.impulse_response
-        assert response[len(response) // 2] == values[centre]
-        assert np.array_equal(np.trim_zeros(response), values)
+        assert response[len(response) // 2] == values[centre] / values.sum()
+        assert np.array_equal(np.trim_zeros(response), values / values.sum())
 
 
 def test_the_real_response_is_the_files(shared_data, tmp_path):
-    """The 201 samples of MATLAB's file, as they are; the responses of all elements are refused."""
+    """The 201 samples of MATLAB's file with a spectrum of at most one; the responses of all elements are refused."""
     (tmp_path / "irf.mat").write_bytes((shared_data / "example_impulse_response.mat").read_bytes())
     rest = ARC.format(count=5) + '[impulse_response]\nfile = "irf.mat"\n'
     response = PlainArray().read(saved(tmp_path, rest=rest)).geometry.impulse_response
     with h5py.File(tmp_path / "irf.mat") as file:
-        assert np.array_equal(response, file["EIR"][0])
+        assert np.allclose(response * abs(np.fft.rfft(file["EIR"][0])).max(), file["EIR"][0], rtol=1e-14, atol=0)
     assert np.argmax(abs(response)) == 100
     rest += 'dataset = "EIR_indiv_mat"\n'
     refuses(saved(tmp_path, rest=rest), "expected one impulse response for all detectors", "(201, 256)")
 
 
+@pytest.mark.parametrize("gain", [1e-6, 1.0, 1e4])
+def test_the_scale_of_a_response_does_not_scale_images(tmp_path, gain):
+    """Whatever its unit, the largest magnitude of its spectrum becomes one, as it does for iThera's files."""
+    np.save(tmp_path / "irf.npy", gain * np.hanning(6))
+    rest = ARC.format(count=5) + '[impulse_response]\nfile = "irf.npy"\n'
+    scan = PlainArray().read(saved(tmp_path, rest=rest))
+    assert abs(np.fft.rfft(scan.geometry.impulse_response)).max() == pytest.approx(1, abs=1e-15)
+    assert f"divided by {gain * np.hanning(6).sum():.4g}" in scan.notes[-1]
+
+
 @pytest.mark.parametrize(
     ("values", "keys", "words"),
     [
-        (np.zeros(5), "", ("expected one impulse response", "of zeros")),
+        (np.zeros(5), "", ("expected an impulse response, found only zeros",)),
         (np.ones(5), "centre = 5", ("the centre 5 lies beyond the 5 samples",)),
         (np.ones(5), "centre = -1", ("[impulse_response].centre: must be a whole number at least 0",)),
         (np.array([1, np.inf]), "", ("expected finite numbers",)),
+        (np.full(5, 1e308), "", ("numbers out of range",)),
     ],
 )
 def test_an_unusable_response_is_refused(tmp_path, values, keys, words):
@@ -457,7 +468,7 @@ def test_the_example_of_the_page_is_read(tmp_path):
     scan = PlainArray().read(tmp_path / "scan.toml")
     assert np.array_equal(scan.signals[...], whole)
     assert np.array_equal(scan.geometry.detectors.positions_m, arc_detectors(5).positions_m)
-    assert np.array_equal(scan.geometry.impulse_response, np.hanning(201))
+    assert np.array_equal(scan.geometry.impulse_response, np.hanning(201) / np.abs(np.fft.rfft(np.hanning(201))).max())
     assert np.array_equal(scan.pulse_energy, np.ones((4, 2)))
     assert len(scan.notes) == 2
 

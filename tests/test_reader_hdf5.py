@@ -12,7 +12,7 @@ import pytest
 from oatkit.builtin.readers.oatkit_hdf5 import OatkitHdf5
 from oatkit.data import Detectors, Geometry, Grid, Image, Scan
 from oatkit.errors import ReadError, ResultError, ValidationError
-from oatkit.scanfile import read_truth, write_scan
+from oatkit.scanfile import read_truth, read_truths, write_scan
 
 RNG_SEED = 3
 
@@ -80,6 +80,37 @@ def test_the_truth_comes_back_as_it_was(tmp_path, dtype):
     """The image that a scan was simulated from, with its grid and wavelengths."""
     write_scan(a_scan(), tmp_path / "scan.h5", a_truth(dtype))
     assert read_truth(tmp_path / "scan.h5") == a_truth(dtype)
+
+
+def test_several_truths_come_back_by_quantity(tmp_path):
+    """Each as it was, pixels without a value too, on a grid of its own; the first is what the scan was made from."""
+    grid = Grid((4, 5), 2e-4)
+    so2 = Image(np.where(np.eye(4, 5) > 0, np.nan, 0.5), "so2", "", grid)
+    total = Image(np.full((4, 5), 1.25), "total_haemoglobin", "mol/m^3", grid)
+    write_scan(a_scan(), tmp_path / "scan.h5", [a_truth(), so2, total])
+    found = read_truths(tmp_path / "scan.h5")
+    assert list(found) == ["initial_pressure", "so2", "total_haemoglobin"]
+    assert list(found.values()) == [a_truth(), so2, total]
+    assert read_truth(tmp_path / "scan.h5") == a_truth()
+
+
+def test_a_file_with_one_truth_or_none_has_as_many(tmp_path):
+    """`read_truths` reads what a file holds that was written before there could be several."""
+    write_scan(a_scan(), tmp_path / "one.h5", a_truth())
+    write_scan(a_scan(), tmp_path / "none.h5")
+    with h5py.File(tmp_path / "one.h5") as file:
+        assert "truth_images" not in file
+        assert b"truth_images" not in file["about"][0]
+    assert read_truths(tmp_path / "one.h5") == {"initial_pressure": a_truth()}
+    assert read_truths(tmp_path / "none.h5") == {}
+
+
+@pytest.mark.parametrize("quantity", ["initial_pressure", "a/b", ""])
+def test_a_truth_needs_a_name_of_its_own(tmp_path, quantity):
+    """Two of one quantity, or one that is no name of a dataset, are refused, and no file is left."""
+    with pytest.raises(ValidationError, match="one image for each quantity"):
+        write_scan(a_scan(), tmp_path / "scan.h5", [a_truth(), replace(a_truth(), quantity=quantity)])
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_real_scan_survives_the_copy(mouse_scan, tmp_path):

@@ -257,7 +257,7 @@ BROKEN = {
     "no detectors": (replaced("GEOMETRY", None), "'GEOMETRY'"),
     "one detector less": (replaced("GEOMETRY", RING[1:]), "the geometry says"),
     "detectors in mm": (replaced("GEOMETRY", 1e3 * RING), "the unit is m"),
-    "a cup of detectors": (replaced("GEOMETRY", RING + np.arange(16)[:, None] * [0, 0, 1e-3]), "one plane"),
+    "a cup of detectors": (replaced("GEOMETRY", RING + np.arange(16)[:, None] * [0, 0, 1e-3]), "a plane"),
     "three axes": (replaced("raw_data", raw_data()[0]), "4 axes"),
     "complex signals": (replaced("raw_data", raw_data().astype("c8")), "type"),
     "no frame": (replaced("raw_data", raw_data()[:0]), "'fs'|shape"),
@@ -433,18 +433,26 @@ def test_a_crossing_outline_holds_what_an_odd_number_of_sides_surrounds(tmp_path
 
 
 def test_outlines_without_area_are_left_out_with_a_word(whole, caplog):
-    """Two points, none, and numbers that are no points."""
-    for name, values in {"line_": HAND_DRAWN[:2], "none_": np.zeros((0, 2)), "odd_": np.ones(3)}.items():
+    """Two points, none, numbers that are no points, texts, and what is no dataset."""
+    texts = np.full((3, 2), b"0.01")
+    odd = {"line_": HAND_DRAWN[:2], "none_": np.zeros((0, 2)), "odd_": np.ones(3), "text_": texts}
+    for name, values in odd.items():
         changed(whole, lambda file, name=name, values=values: add_roi(file, name, values))
+    changed(whole, lambda file: file.create_dataset("rois/words_/0", data=["a", "b", "c"]))
+    changed(whole, lambda file: file.create_group("rois/zoo_/0"))
     assert len(oatkit.read_regions(whole)) == 3
-    assert [record.args[1] for record in caplog.records] == ["line_/0", "none_/0", "odd_/0"]
+    left_out = [record.args[1].removesuffix("_/0") for record in caplog.records]
+    assert left_out == ["line", "none", "odd", "text", "words", "zoo"]
 
 
-def test_regions_in_mm_are_refused(whole):
-    """With a hint at the unit, and the name of the region."""
-    changed(whole, lambda file: add_roi(file, "big_", 1e3 * HAND_DRAWN))
-    with pytest.raises(ReadError, match=r"'big_/0'.*unit is m"):
-        oatkit.read_regions(whole)
+@pytest.mark.parametrize(("factor", "words"), [(1e3, "unit is m"), (np.nan, "nan is outside")])
+def test_a_region_that_makes_no_sense_leaves_the_others(whole, caplog, factor, words):
+    """Corners in mm, or NaN: the log names the region and what is wrong with it, and all others are read."""
+    changed(whole, lambda file: add_roi(file, "bad_", factor * HAND_DRAWN))
+    assert [r.name for r in oatkit.read_regions(whole)] == ["reference_/0", "tumour_left/0", "tumour_left/1"]
+    (record,) = caplog.records
+    assert "'bad_/0'" in record.getMessage()
+    assert words in record.getMessage()
 
 
 # Files that mean harm, and files of others --------------------------------------------------------------------------

@@ -7,8 +7,8 @@ from hypothesis import strategies as some
 
 from oatkit.data import Grid
 from oatkit.errors import ReadError, ResultError, ValidationError
-from oatkit.region_files import load_regions, save_regions
 from oatkit.regions import EllipseRegion, MaskRegion, PolygonRegion, RectangleRegion
+from oatkit.regions.files import load_regions, save_regions
 
 GRID = Grid((5, 4), 1e-3)
 LABELS = np.zeros(GRID.shape, np.uint8)

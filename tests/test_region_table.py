@@ -10,10 +10,10 @@ import pytest
 from oatkit.data import Image
 from oatkit.errors import ResultError, ValidationError
 from oatkit.metrics import cnr
-from oatkit.region_files import save_regions
-from oatkit.region_table import COLUMNS, RegionRow, region_rows, region_table, write_csv
-from oatkit.region_text import table_text
 from oatkit.regions import EllipseRegion, MaskRegion, rim
+from oatkit.regions.files import save_regions
+from oatkit.regions.table import COLUMNS, RegionRow, region_rows, region_table, write_csv
+from oatkit.regions.text import table_text
 from oatkit.store import load
 from packages import run_oatkit
 from results import GRID, WAVELENGTHS_NM, make_result, write_frames
@@ -51,7 +51,7 @@ def test_the_numbers_are_those_of_numpy(undefined):
 
 def test_numbers_of_single_precision_are_summed_in_double():
     """A million pixels of 0.1 in float32 have the mean of that number to rounding of doubles."""
-    from oatkit.region_table import statistics
+    from oatkit.regions.table import statistics
 
     assert statistics(np.full(1_000_000, 0.1, np.float32))["mean"] == pytest.approx(float(np.float32(0.1)), rel=1e-12)
 
@@ -234,7 +234,7 @@ def region_file(tmp_path_factory):
 def test_the_command_gives_the_table_of_the_script(folder, region_file, tmp_path):
     """`roi` writes the CSV that `write_csv` does and prints the same rows as JSON; the text shows each frame."""
     from oatkit.plain import encode
-    from oatkit.region_files import load_regions
+    from oatkit.regions.files import load_regions
 
     arguments = ("roi", str(folder), "-r", str(region_file), "--background", "out")
     done = run_oatkit(*arguments, "-o", "table.csv", "--figure", "spectra.png", "--frame", "2", "--json", cwd=tmp_path)
@@ -280,7 +280,7 @@ class TestSpectra:
 
     def curves(self, rows):
         """What is drawn, axes by axes: the lines by their label."""
-        from oatkit.spectra_figure import spectra_figure
+        from oatkit.regions.spectra import spectra_figure
 
         figure = spectra_figure(rows)
         return [{line.get_label(): line.get_xydata() for line in axes.get_lines()} for axes in figure.axes]
@@ -297,7 +297,7 @@ class TestSpectra:
 
     def test_a_region_keeps_its_colour_where_it_has_no_values(self):
         """Its line is empty there, and the others have the colours that they have in the other plots."""
-        from oatkit.spectra_figure import spectra_figure
+        from oatkit.regions.spectra import spectra_figure
 
         nothing = np.where(MASKS["vessel"] & ~MASKS["muscle"], np.nan, 1.0) * np.ones((2, 1, 1))
         only = [MaskRegion("vessel", MASKS["vessel"] & ~MASKS["muscle"], GRID), REGIONS[1]]
@@ -309,7 +309,7 @@ class TestSpectra:
 
     def test_the_band_is_one_standard_deviation_to_either_side(self):
         """Its edges at a wavelength are mean - std and mean + std."""
-        from oatkit.spectra_figure import spectra_figure
+        from oatkit.regions.spectra import spectra_figure
 
         rows = region_table({"p": random_image()}, REGIONS[:1])
         (axes,) = spectra_figure(rows).axes
@@ -322,7 +322,7 @@ class TestSpectra:
     def test_a_name_from_a_file_is_shown_as_it_is(self):
         """No dollar makes a formula of it, and none breaks the figure."""
         from oatkit.page import png
-        from oatkit.spectra_figure import spectra_figure
+        from oatkit.regions.spectra import spectra_figure
 
         rows = region_table({"p": random_image()}, [replace(REGIONS[0], name=r"$\frac{ $x^")])
         assert png(spectra_figure(rows))

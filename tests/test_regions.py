@@ -8,7 +8,7 @@ import pytest
 
 from oatkit.data import Grid, Image
 from oatkit.errors import ValidationError
-from oatkit.regions import CORNERS, EllipseRegion, MaskRegion, PolygonRegion, RectangleRegion, core, rim
+from oatkit.shapes import CORNERS, EllipseRegion, MaskRegion, PolygonRegion, RectangleRegion, core, rim
 
 GRID = Grid((61, 61), 0.2e-3)
 L_SHAPE = 1e-3 * np.array([(-4, -3), (-4, 5), (-1, 5), (-1, 1), (3, 1), (3, -3)], float)

@@ -19,9 +19,9 @@ from oatkit.data import Grid, Image
 from oatkit.errors import ResultError, ValidationError
 from oatkit.regions import EllipseRegion, MaskRegion, PolygonRegion, rim
 from oatkit.report import report_page, write_report
-from oatkit.report.pictures import scale_of
 from oatkit.report.ticks import linear, logarithmic, round_part
 from oatkit.result import Result
+from oatkit.sheet import scale_of
 from oatkit.store import load
 from packages import run_oatkit
 from results import GRID, WAVELENGTHS_NM, make_result, pressure, write_frames

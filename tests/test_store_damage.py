@@ -164,7 +164,8 @@ def test_a_frame_that_was_never_written_is_found(stored: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("limit", "size"), [("oatkit.manifest.LARGEST_MANIFEST", 1000), ("oatkit.store.LARGEST_IMAGE", 2 * 24 * 30 * 4 - 1)]
+    ("limit", "size"),
+    [("oatkit.store.manifest.LARGEST_MANIFEST", 1000), ("oatkit.store.folder.LARGEST_IMAGE", 2 * 24 * 30 * 4 - 1)],
 )
 def test_what_is_too_large_is_not_read(stored: Path, monkeypatch: pytest.MonkeyPatch, limit: str, size: int) -> None:
     """A manifest or an image above the stated limit in bytes is refused before it is read into memory."""

@@ -7,7 +7,6 @@ another plugin.
 """
 
 from abc import ABC, abstractmethod
-from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -15,12 +14,13 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pluggy
 
+from oatkit.checkpoint import checkpoint
 from oatkit.data import Detectors, Geometry, Grid, Image, Optics, Scan, Signals
 from oatkit.errors import OatkitError, PluginError, ReadError, SolverError, ValidationError
 from oatkit.parameters import Parameters, param
 from oatkit.problem import Calibration, Iterate, Problem, UnmixProblem
-from oatkit.regions import EllipseRegion, PolygonRegion, RectangleRegion, Region
 from oatkit.scale import Reference
+from oatkit.shapes import EllipseRegion, PolygonRegion, RectangleRegion, Region
 
 __all__ = [
     "KINDS", "Calibration", "Detectors", "EllipseRegion", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image",
@@ -153,10 +153,12 @@ class Solver(Plugin):
 
     def solve(self, problem: Problem) -> Iterate:
         """Run to the end and return the last state."""
-        states = deque(self.iterate(problem), maxlen=1)
-        if not states:
+        last = None
+        for last in self.iterate(problem):
+            checkpoint()
+        if last is None:
             raise PluginError(f"solver '{self.name}' ended without yielding an image")
-        return states[0]
+        return last
 
 
 class Segmenter(Plugin):

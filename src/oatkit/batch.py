@@ -10,6 +10,7 @@ from oatkit.errors import OatkitError, ValidationError
 from oatkit.events import Listener, ignore
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
+from oatkit.reconstruction import frame_key
 from oatkit.result import Result
 from oatkit.rules import motion_in, resolve
 from oatkit.store import StoreWriter, load
@@ -36,27 +37,31 @@ def run_frames(
     missing = [f for f in chosen if not 0 <= f < scan.frames]
     if missing or not chosen:
         raise ValidationError(f"frames {missing or chosen}: the scan has frames 0 .. {scan.frames - 1}")
-    scan.geometry.check_grid(pipeline.grid.grid())  # a slip of the pipeline's is not each frame's failure
+    # A slip of the pipeline's is not each frame's failure.
+    pipeline.scan.apply(scan).geometry.check_grid(pipeline.grid.grid())
     memo = Memo()
     left_out = _left_out(pipeline, scan, chosen, memo, on_event)
     chosen = [frame for frame in chosen if frame not in left_out]
     with StoreWriter(path, frames=len(chosen), source=scan.source, overwrite=overwrite) as writer:
         if pipeline.scan.rules == "scan":
             resolved = replace(resolve(pipeline, scan, memo, on_event), left_out=left_out)
-        failures = []
+        first_failure, failed = None, 0
         for index, frame in enumerate(chosen):
             try:
                 if pipeline.scan.rules == "frame":
                     resolved = replace(resolve(pipeline, scan, memo, on_event, frame), left_out=left_out)
                 result = run_resolved(resolved, scan, frame, memo, on_event)
             except OatkitError as error:
-                failures.append(error)
+                # Only one is held: with it go the images that were in the making.
+                first_failure, failed = first_failure or error, failed + 1
                 writer.fail(index, f"frame {frame}: {error}")
             else:
                 writer.write(index, result)
+            # No other frame needs what was made of this one; without this, memory grows with the scan.
+            memo.forget(*frame_key(scan, frame))
             on_frame(frame)
-        if len(failures) == len(chosen):
-            raise failures[0]
+        if first_failure and failed == len(chosen):
+            raise first_failure
     return load(path)
 
 

@@ -19,14 +19,14 @@ METHODS = ("lsqr", "lsqr-threshold", "maxent")
 WHAT = "a breast-like phantom, 256 detectors on 270 degrees, SNR 32 dB over the samples that the image can reach"
 
 
-def simulated(phantom: str, snr_db: float, seed: int) -> tuple[Scan, Image]:
+def simulated(phantom: str, snr_db: float, seed: int, frames: int = 1) -> tuple[Scan, Image]:
     """Return a scan of a phantom and the truth on the grid of the presets; the simulating grid is a finer one."""
     from oatkit.simulate import simulate_scan, truth
 
     arc = plugin("forward_model", "arc")()
     assert isinstance(arc, ForwardModel)
     grid = Pipeline.load("maxent").grid.grid()
-    scan = simulate_scan(phantom, arc, snr_db=snr_db, seed=seed)
+    scan = simulate_scan(phantom, arc, snr_db=snr_db, frames=frames, seed=seed)
     return scan, truth(phantom, grid)
 
 

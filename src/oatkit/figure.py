@@ -41,21 +41,25 @@ def write_comparison(
 
 
 def image_figure(result: Result) -> Figure:
-    """Draw all images of a result's (first) frame, one panel for each wavelength, with how they came about."""
+    """Draw all images of a result's (first) frame, one panel for each wavelength, with how they came about.
+
+    Those of many wavelengths come first, so that the others share rows.
+    """
+    boundary = result.get("boundary")
     groups = [
         [
-            Panel(_title(image, i), image, tuple(_lines(image, i)), i, _outline(result, image))
+            Panel(_title(image, i), image, tuple(_lines(image, i, boundary)), i, _outline(image, boundary))
             for i, _ in enumerate(image.values)
         ]
-        for image in result.values()
+        for image in sorted(result.values(), key=lambda image: len(image.values) == 1)
     ]
     name = result.scan.get("name") or "Reconstruction"
     return sheet(groups, (), f"{name}, frame {result.frame_index}", " · ".join(_provenance(result)))
 
 
-def _outline(result: Result, image: Image) -> Image | None:
+def _outline(image: Image, boundary: Image | None) -> Image | None:
     """Return the outline of the body for the pictures that are about it: where it lies, and the light in it."""
-    return result.get("boundary") if image.quantity in ("boundary", "fluence") else None
+    return boundary if image.quantity in ("boundary", "fluence") else None
 
 
 def _title(image: Image, index: int) -> str:
@@ -63,14 +67,14 @@ def _title(image: Image, index: int) -> str:
     return f"{quantity}, {image.wavelengths_nm[index]:g} nm" if image.wavelengths_nm else quantity
 
 
-def _lines(image: Image, index: int) -> Iterator[str]:
+def _lines(image: Image, index: int, boundary: Image | None) -> Iterator[str]:
     """Yield how many pixels of one wavelength are negative, what else is worth saying, what its solver promises."""
     plane, found = image.values[index], image.diagnostics
     negative = int((plane < 0).sum())
     if counts_negatives(image):
         share = 100 * negative / max(1, int(np.isfinite(plane).sum()))
         yield f"{negative:,} negative pixel{'s' * (negative > 1)} ({share:.1f} %)" if negative else "no negative pixels"
-    yield from plane_words(image, index)
+    yield from plane_words(image, index, boundary)
     gap = _of_wavelength(found.get("relative_gap"), index)
     if gap is not None and math.isfinite(gap):
         yield f"certified within {gap:.1e} of the optimum"

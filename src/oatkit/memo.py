@@ -50,5 +50,11 @@ class Memo:
             while len(self._values) > 1 and sum(s for _, s in self._values.values()) > self.limit_bytes:
                 self._values.popitem(last=False)
 
+    def forget(self, *beginning: Hashable) -> None:
+        """Drop the values of all keys that are tuples which begin so."""
+        with self._lock:
+            for key in [key for key in self._values if isinstance(key, tuple) and key[: len(beginning)] == beginning]:
+                del self._values[key]
+
     def __len__(self) -> int:
         return len(self._values)

@@ -53,6 +53,11 @@ class Scale:
         """Blue below zero, white at zero, red above, up to the largest of finite `values`."""
         return cls(Normalize(-_size(values), _size(values)), colormaps["RdBu_r"].with_extremes(bad=UNDEFINED))
 
+    @classmethod
+    def fraction(cls) -> Self:
+        """From dark blue at 0 to yellow at 1, in even steps for the eye, whatever the values."""
+        return cls(Normalize(0, 1), colormaps["viridis"].with_extremes(bad=UNDEFINED))
+
     def paint(self, values: np.ndarray, negative: np.ndarray) -> np.ndarray:
         """Return the colours of `values`, pure red where `negative`: shape ``(y, x, 4)``."""
         colours = np.asarray(self.colours(self.normalise(np.ma.masked_invalid(values.astype(float)))))

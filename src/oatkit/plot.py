@@ -73,14 +73,14 @@ def draw_plot(page: Page, plot: Plot, left: int, bottom: int, width: int, height
     """Draw a plot into a box of the page, its title above the box, a long legend to the right of it."""
     axes = page.axes(left + AXIS_LEFT, bottom + AXIS_BELOW, width - AXIS_LEFT, height - AXIS_BELOW)
     for colour, curve in zip(_cycled(len(plot.curves)), plot.curves, strict=True):
-        axes.plot(curve.x, curve.y, curve.style, color=colour, linewidth=1, markersize=2.5, label=curve.label)
+        axes.plot(curve.x, curve.y, curve.style, color=colour, linewidth=1, markersize=2.5, label=_literal(curve.label))
         if curve.spread is not None:
             low, high = np.subtract(curve.y, curve.spread), np.add(curve.y, curve.spread)
             axes.fill_between(curve.x, low, high, color=colour, alpha=0.15, linewidth=0)
     for colour, mark in zip(_cycled(len(plot.marks)), plot.marks, strict=True):
-        axes.plot([mark.x], [mark.y], "D", color=colour, markersize=4.5, fillstyle="none", label=mark.label)
+        axes.plot([mark.x], [mark.y], "D", color=colour, markersize=4.5, fillstyle="none", label=_literal(mark.label))
     for x, label in plot.verticals:
-        axes.axvline(x, color=PALE, linewidth=0.8, linestyle=":", label=label)
+        axes.axvline(x, color=PALE, linewidth=0.8, linestyle=":", label=_literal(label))
     if "x" in plot.logarithmic:
         axes.set_xscale("log")
     if "y" in plot.logarithmic:
@@ -96,6 +96,11 @@ def draw_plot(page: Page, plot: Plot, left: int, bottom: int, width: int, height
         beside = {"loc": "upper left", "bbox_to_anchor": (1, 1)} if plot.legend_width else {}
         axes.legend(fontsize=6.5, frameon=False, **beside)
     page.text(left + AXIS_LEFT, bottom + height + 14, plot.title, size=9.5, va="bottom")
+
+
+def _literal(label: str) -> str:
+    """Return a label, which may hold a name from a file, as matplotlib shows it: no formula, and never kept back."""
+    return label.replace("$", r"\$").lstrip("_")
 
 
 def _cycled(count: int) -> list[str]:

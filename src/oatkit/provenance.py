@@ -1,6 +1,7 @@
 """Which versions of what made a result."""
 
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 from oatkit.api import Plugin
@@ -24,6 +25,7 @@ def _plugins(pipeline: Pipeline) -> list[Plugin]:
     return [*pipeline.preprocess, *(step for step in slots if step is not None)]
 
 
+@cache  # a run over many frames asks for each
 def _version(name: str) -> str | None:
     try:
         return version(name)

@@ -9,6 +9,9 @@ from oatkit.data import Image, Scan
 from oatkit.errors import ReadError
 from oatkit.registry import installed
 
+RESULT = "manifest.json"
+"""The file that every folder of a result has."""
+
 
 def read(path: str | Path, reader: Reader | None = None) -> Scan:
     """Return the scan in `path`, its signals lazily where the format allows.
@@ -52,8 +55,18 @@ def _reader_of(path: Path) -> Reader:
         raise ReadError(f"{path}: the readers {names} both claim this file; hand one of them to read()")
     if not claiming:
         known = ", ".join(reader.name for reader in readers)
-        raise ReadError(f"{path}: no installed reader knows this file (readers: {known}){''.join(failed)}")
+        raise ReadError(f"{path}: {_unknown(path)} (readers: {known}){''.join(failed)}")
     return claiming[0]
+
+
+def _unknown(path: Path) -> str:
+    """Say that nobody reads a file, and what may have been meant."""
+    if (path / RESULT).is_file():
+        return "a result of a run, not a scan; `oatkit report`, `oatkit roi` and `oatkit export` take it"
+    if path.is_dir():
+        return "no installed reader knows this folder; name the file of the scan in it"
+    empty = path.is_file() and not path.stat().st_size
+    return "the file is empty" if empty else "no installed reader knows this file"
 
 
 def _exists(path: Path) -> bool:

@@ -108,9 +108,14 @@ def history_of(pipeline: Pipeline) -> tuple[dict[str, Any], ...]:
     return tuple({"step": slot, **plugin.model_dump()} for slot, plugin in chain)
 
 
+def frame_key(scan: Scan, frame: int) -> tuple[Any, ...]:
+    """Return what all keys of a frame begin with in the memo."""
+    return (scan.fingerprint, scan.notes, frame)
+
+
 def raw_key(pipeline: Pipeline, scan: Scan, frame: int) -> tuple[Any, ...]:
     """Return all that a preprocessed frame depends on."""
-    return (scan.fingerprint, scan.notes, frame, pipeline.scan, pipeline.preprocess)
+    return (*frame_key(scan, frame), pipeline.scan, pipeline.preprocess)
 
 
 def _preprocess(pipeline: Pipeline, scan: Scan, frame: int) -> Scan:

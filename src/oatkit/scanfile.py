@@ -29,7 +29,7 @@ import numpy as np
 from oatkit.atomic import check_output, check_space, new_file
 from oatkit.data import Grid, Image, Scan
 from oatkit.errors import ReadError, ValidationError
-from oatkit.hostile import MAX_CHUNK_BYTES, hdf5_dataset, open_hdf5
+from oatkit.hostile import MAX_CHUNK_BYTES, hdf5_dataset, open_hdf5, printable
 
 MARKER = b"oatkit scan "
 VERSION = 1
@@ -77,7 +77,10 @@ def read_truths(path: Path | str) -> dict[str, Image]:
             dataset = hdf5_dataset(file, name, "f", 3, left)
             left -= dataset.nbytes
             values[name] = dataset[()]
-    return {image.quantity: image for image in (_image(path, known[name], values[name]) for name in known)}
+    truths = {image.quantity: image for image in (_image(path, known[name], values[name]) for name in known)}
+    if len(truths) < len(known):
+        raise ReadError(f"{path} 'about': expected one truth for each quantity, found {len(known)} of {list(truths)}")
+    return truths
 
 
 def _named(truths: Sequence[Image]) -> dict[str, Image]:
@@ -102,8 +105,9 @@ def _descriptions(about: Mapping[str, Any], path: Path) -> Iterator[tuple[str, A
 def _image(path: Path, known: Any, values: np.ndarray) -> Image:
     try:
         grid = Grid(values.shape[1:], known["pixel_size_m"], tuple(known["centre_m"]))
-        return Image(values, known["quantity"], known["unit"], grid, tuple(known["wavelengths_nm"]))
-    except (KeyError, TypeError, ValueError) as error:
+        quantity, unit = (printable(known[key]) for key in ("quantity", "unit"))
+        return Image(values, quantity, unit, grid, tuple(known["wavelengths_nm"]))
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise ReadError(f"{path} 'about': the description of a truth is unusable ({error!r})") from None
 
 

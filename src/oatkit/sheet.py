@@ -14,14 +14,15 @@ import numpy as np
 from oatkit.data import Image
 from oatkit.page import BAR_WIDTH, PALE, PERCENTILE, Figure, Page, Scale
 from oatkit.plot import Plot, draw_plot
-from oatkit.words import SIGNED
+from oatkit.words import FRACTIONS, SIGNED
 
 PANEL, MARGIN, GAP, TITLE, LINE = 640, 64, 48, 72, 44
 """Sizes in dots: least width of a panel, page margin, gap between panels, height of a title and of a line of text."""
 BAR_SPACE = 220
 """Dots for the colour bar and its numbers."""
 PLOT_WIDTH, PLOT_HEIGHT = 980, 680
-COLUMNS = 4
+COLUMNS, WIDEST = 6, 5308
+"""At most so many panels, and dots, in a row: six of 800 dots, those of 200 pixels a side, and their colour bar."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class Block:
 def sheet(groups: Sequence[Sequence[Panel]], plots: Sequence[Plot] = (), title: str = "", caption: str = "") -> Figure:
     """Draw rows of at most `COLUMNS` panels, those of one group in the same colours, and a row of plots below.
 
-    Groups of a single panel stand side by side.
+    Groups of a single panel stand side by side. A row is no wider than `WIDEST` dots, unless a single panel is.
     """
     rows = _rows(groups)
     widths = [sum(block.width for block in row) for row in rows]
@@ -111,18 +112,38 @@ def sheet(groups: Sequence[Sequence[Panel]], plots: Sequence[Plot] = (), title: 
     return page.figure
 
 
+def scale_of(image: Image, planes: np.ndarray) -> Scale:
+    """Return the colours of some planes of `image`: of its whole range where that is known, else of their values."""
+    if image.quantity in FRACTIONS:
+        return Scale.fraction()
+    finite = planes[np.isfinite(planes)].astype(float)
+    return Scale.signed(finite) if image.quantity in SIGNED else Scale.grey(finite)
+
+
 def _rows(groups: Sequence[Sequence[Panel]]) -> list[list[Block]]:
     """Return the blocks of each row."""
     rows: list[list[Block]] = []
     for group in groups:
-        scale = _scale(group)
-        blocks = [Block(tuple(group[i : i + COLUMNS]), scale) for i in range(0, len(group), COLUMNS)]
-        beside = rows and len(group) == 1 and all(len(b.panels) == 1 for b in rows[-1]) and len(rows[-1]) < COLUMNS
-        if beside:
+        scale = scale_of(group[0].image, np.concatenate([panel.values.ravel() for panel in group]))
+        columns = _columns(group)
+        blocks = [Block(tuple(group[i : i + columns]), scale) for i in range(0, len(group), columns)]
+        if rows and _beside(rows[-1], blocks):
             rows[-1] += blocks
         else:
             rows += [[block] for block in blocks]
     return rows
+
+
+def _columns(group: Sequence[Panel]) -> int:
+    """Return how many panels of a group go into a row."""
+    widest = max(panel.size[0] for panel in group) + GAP
+    return min(COLUMNS, max(1, (WIDEST - BAR_SPACE) // widest))
+
+
+def _beside(row: Sequence[Block], blocks: Sequence[Block]) -> bool:
+    """Say whether a group fits into the row before it: both of single panels."""
+    together = [*row, *blocks]
+    return all(len(block.panels) == 1 for block in together) and sum(block.width for block in together) <= WIDEST
 
 
 def _height(row: Sequence[Block]) -> int:
@@ -131,11 +152,6 @@ def _height(row: Sequence[Block]) -> int:
 
 def _plot_width(plot: Plot) -> int:
     return PLOT_WIDTH + plot.legend_width + GAP
-
-
-def _scale(panels: Sequence[Panel]) -> Scale:
-    values = np.concatenate([panel.values[np.isfinite(panel.values)] for panel in panels]).astype(float)
-    return Scale.signed(values) if panels[0].image.quantity in SIGNED else Scale.grey(values)
 
 
 def _legend(groups: Sequence[Sequence[Panel]]) -> str:

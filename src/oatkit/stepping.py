@@ -3,8 +3,9 @@
 A step is computed again only where the scan, the frame or a step up to it has changed (`oatkit.memo.Memo`).
 """
 
+import re
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from oatkit.data import Image, Scan
@@ -13,6 +14,8 @@ from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.quantification import following, quantify
 from oatkit.reconstruction import preprocess, raw_key, reconstruct
+
+NUMBER = re.compile(r"[0-9.]+(e[+-]?[0-9]+)?")
 
 
 def steps(pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = None) -> Iterator[Event]:
@@ -56,16 +59,27 @@ def _memoised(memo: Memo, key: tuple[Any, ...], step: str, work: Iterator[Any]) 
 
 
 def _warnings(step: str, images: Mapping[str, Image]) -> tuple[str, ...]:
-    """Say what a step found worth saying, and of each wavelength whose solver did not keep its promise why."""
+    """Say what a step found worth saying, and where its solver did not keep its promise why.
+
+    Wavelengths whose reasons differ in their numbers only share a sentence, with the reason of the first.
+    """
     found = []
     for name, image in images.items():
         found += [f"{name}: {note}" for note in image.diagnostics.get("notes", ())]
         converged = image.diagnostics.get("converged", ())
         reasons = image.diagnostics.get("reason", ())
+        alike: dict[str, list[tuple[float, str]]] = {}
         for wavelength, fine, reason in zip(image.wavelengths_nm, converged, reasons, strict=False):
             if not fine:
-                found.append(f"{step} at {wavelength:g} nm did not converge: {reason}")
+                alike.setdefault(NUMBER.sub("", str(reason)), []).append((wavelength, reason))
+        found += [_unconverged(step, cases) for cases in alike.values()]
     return tuple(found)
+
+
+def _unconverged(step: str, cases: Sequence[tuple[float, str]]) -> str:
+    (wavelength, reason), further = cases[0], len(cases) - 1
+    more = f" and at {further} further wavelength{'s' * (further > 1)}" if further else ""
+    return f"{step} at {wavelength:g} nm{more} did not converge: {reason}"
 
 
 def _once(name: str, pipeline: Pipeline, images: Mapping[str, Image]) -> Iterator[dict[str, Image]]:

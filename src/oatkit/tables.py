@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 
 from oatkit.data import Grid, Optics, Scan
-from oatkit.optics import read_optics
 from oatkit.parameters import Parameters, param
 from oatkit.spectra import TISSUES, tissue_optics
+from oatkit.spectra.optics import read_optics
 from oatkit.wavelengths import choose_wavelengths, wavelength_notes
 
 
@@ -31,9 +31,23 @@ class ScanTable(Parameters):
         "whether words that stand for numbers (weight, speed of sound, calibration) are replaced once for the scan, on "
         "its first frame, or anew on each frame",
     )
+    wavelengths_nm: tuple[float, ...] = param(
+        (),
+        "those to use, within 0.5 nm, in the order of the scan; all where none is named",
+        unit="nm",
+        at_least=100,
+        at_most=20_000,
+    )
 
     def apply(self, scan: Scan) -> Scan:
-        """Return the scan with its values overridden; a speed of sound that is still a rule is left alone."""
+        """Return the scan with its values overridden; a speed of sound that is still a rule is left alone.
+
+        The order of wavelengths is that of the scan: repeated ones stay repeated, unsorted ones unsorted, and a note
+        says so. Signals in a file stay there. Raises `ValidationError` for a wavelength that the scan does not have.
+        """
+        if self.wavelengths_nm:
+            scan = choose_wavelengths(scan, self.wavelengths_nm)
+        scan = replace(scan, notes=(*scan.notes, *wavelength_notes(scan.wavelengths_nm)))
         if isinstance(self.speed_of_sound_m_s, float | int):
             scan = scan.with_speed_of_sound(self.speed_of_sound_m_s, "pipeline")
         if self.start_time_us is not None:

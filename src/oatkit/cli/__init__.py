@@ -4,14 +4,15 @@ Exit codes: 0 done, 1 the result could not be written, 2 usage or invalid pipeli
 4 unreadable input, 130 interrupted.
 """
 
+import logging
 import signal
 
 # Each registers its commands, which --help lists in this order.
 # isort: off
-from oatkit.cli import showcase, scans, results, catalogue  # noqa: F401
+from oatkit.cli import showcase, scans, results, regions, series, windows, catalogue  # noqa: F401
 
 # isort: on
-from oatkit.cli.app import app, terminate
+from oatkit.cli.app import Complaints, app, terminate
 
 
 def main() -> None:
@@ -19,4 +20,5 @@ def main() -> None:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), terminate)
+    logging.getLogger("oatkit").addHandler(Complaints())
     app()

@@ -1,6 +1,7 @@
 """What all commands share: how they are registered, their exit codes, and the arguments that they have in common."""
 
 import functools
+import logging
 import os
 import sys
 from collections.abc import Callable
@@ -100,6 +101,14 @@ def complain(text: str) -> None:
         # Names from files must not steer the terminal.
         shown = "".join(c if c.isprintable() else repr(c)[1:-1] for c in line)
         typer.echo(f"oatkit: {shown}", err=True)
+
+
+class Complaints(logging.Handler):
+    """Prints what the log of oatkit warns of, as `complain` does."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print one warning."""
+        complain(record.getMessage())
 
 
 def check_new(path: Path, overwrite: bool) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import time
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,7 @@ from typing import Annotated
 import typer
 
 from oatkit.cli.app import AsJson, Changes, Overwrite, ScanPath, check_new, command, frames_in
+from oatkit.data import Image, Scan
 from oatkit.errors import SolverError, ValidationError
 
 
@@ -17,6 +19,7 @@ class Phantom(StrEnum):
 
     BREAST = "breast"
     DISC = "disc"
+    OXYGEN = "oxygen"
     STAR = "star"
     VESSEL = "vessel"
 
@@ -85,7 +88,7 @@ def motion(
     typer.echo(json.dumps(found.table(), indent=2, allow_nan=False) if as_json else motion_text(found))
     if figure is not None:
         from oatkit.atomic import write_file
-        from oatkit.motion_figure import motion_figure  # matplotlib
+        from oatkit.motion.figure import motion_figure  # matplotlib
         from oatkit.page import png
 
         write_file(figure, png(motion_figure(found)), overwrite)
@@ -127,7 +130,7 @@ def focus(
     typer.echo(json.dumps(result.table(), indent=2, allow_nan=False) if as_json else focus_text(result))
     if figure is not None:
         from oatkit.atomic import write_file
-        from oatkit.focus_figure import focus_figure  # matplotlib
+        from oatkit.focus.figure import focus_figure  # matplotlib
         from oatkit.page import png
 
         write_file(figure, png(focus_figure(result)), overwrite)
@@ -136,12 +139,15 @@ def focus(
 
 @command
 def simulate(
-    phantom: Annotated[Phantom, typer.Argument(help="What is imaged.")],
+    phantom: Annotated[
+        Phantom, typer.Argument(help="What is imaged; oxygen: vessels in a body that dims its light, 680 .. 900 nm.")
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="SCAN.h5", help="The scan file to write.")],
     snr: Annotated[
         float, typer.Option(help="Signal to noise in dB, in the window that the field of view reaches.")
     ] = 32.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise, and of the body where it is drawn.")] = 0,
+    frames: Annotated[int, typer.Option(min=1, help="How many, each with noise of its own.")] = 1,
     overwrite: Overwrite = False,
 ) -> None:
     """Simulate a scan of a phantom on a finer grid than the one that reconstructs, and write it with the truth."""
@@ -149,6 +155,48 @@ def simulate(
     from oatkit.scanfile import write_scan
 
     check_new(output, overwrite)
-    scan, truth = simulated(phantom.value, snr, seed)
-    write_scan(scan, output, truth, overwrite=overwrite)
+    if phantom is Phantom.OXYGEN:
+        scan, truths = _simulated_oxygen(snr, seed, frames)
+    else:
+        scan, truth = simulated(phantom.value, snr, seed, frames)
+        truths = [truth]
+    write_scan(scan, output, truths, overwrite=overwrite)
     typer.echo(f"wrote {output}: {phantom.value} phantom, {snr:g} dB, seed {seed}")
+    if phantom is Phantom.OXYGEN:
+        # The preset is for scanners, whose light comes through water; K is 1 here, and found only without that.
+        clear = "--set fluence.use=diffusion-fvm --set fluence.band_width=8"
+        typer.echo(f"note: the water takes no light here: oatkit run multispectral {output} -o OUT.zarr {clear}")
+
+
+def _simulated_oxygen(snr_db: float, seed: int, frames: int) -> tuple[Scan, list[Image]]:
+    """Return a scan of a drawn body and, on the grid of the preset, its initial pressure, so2 and total haemoglobin."""
+    from oatkit.api import ForwardModel
+    from oatkit.pipeline import Pipeline
+    from oatkit.registry import plugin
+    from oatkit.simulate import OxygenBody, illuminate, oxygen_phantom, simulate_scan
+
+    arc = plugin("forward_model", "arc")()
+    assert isinstance(arc, ForwardModel)
+    body, grid = OxygenBody.draw(seed), Pipeline.load("multispectral").grid.grid()
+    lit = illuminate(body)  # by far the longest part, so once for signals and truth
+    scan = simulate_scan(oxygen_phantom(lit), arc, snr_db=snr_db, frames=frames, seed=seed)
+    note = f"the body of seed {seed} in water that takes no light, p0 = mu_a Phi in units of 1/m"
+    scan = replace(scan, notes=(*scan.notes, note))
+    return scan, [lit.pressure(grid), body.so2(grid), body.total_haemoglobin(grid)]
+
+
+@command
+def convert(
+    scan: ScanPath,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What to write; its ending says in which format.")],
+    overwrite: Overwrite = False,
+) -> None:
+    """Write a scan in another format: .h5 is the scan file of oatkit, .hdf5 is IPASC."""
+    from oatkit.convert import convert as write
+    from oatkit.reading import read
+
+    check_new(file, overwrite)
+    notes = write(read(scan), file, overwrite)
+    typer.echo(f"wrote {file}")
+    for note in notes:
+        typer.echo(f"note: {note}")

@@ -9,6 +9,7 @@ EXPERIMENTS: Mapping[str, str] = {
     "fig4": "what the start of the iteration does",
     "fig5": "the whole chain on a mouse: outline, light, pressure, absorption",
     "fig6": "absorption in the Fourier domain",
+    "fig7": "spectra of two regions, and where least squares turns them negative",
     "figS1": "maximum entropy over the range of its weight",
     "figS2": "L1 penalties beside least squares and maximum entropy",
     "table1": "sharpness and the number of non-negative pixels",

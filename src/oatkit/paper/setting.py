@@ -26,6 +26,8 @@ class Setting:
     """How many seeds of the noise the ranking averages over."""
     bodies: tuple[str, ...] = ("breast", "star", "disc", "mouse", "vessel")
     """Those of the ranking."""
+    wavelengths_nm: tuple[float, ...] = tuple(range(680, 901, 20))
+    """Those of fig7, the paper's; the other experiments have one."""
     per_decade: int = 2
     """How many weights are tried in each decade of a method's range."""
     scan: Path | None = None

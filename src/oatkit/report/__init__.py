@@ -12,10 +12,10 @@ from importlib.resources import files
 from pathlib import Path
 
 from oatkit.atomic import check_output, write_file
-from oatkit.errors import ResultError
+from oatkit.errors import ResultError, ValidationError
 from oatkit.page import PERCENTILE
 from oatkit.plot import COLOURS
-from oatkit.region_table import RegionOf
+from oatkit.regions.table import RegionOf
 from oatkit.report.content import content_of
 from oatkit.result import Result
 
@@ -38,9 +38,11 @@ def write_report(
     """Write one frame of a result as an HTML page; without `frame`, the one that it shows.
 
     `regions` are drawn over the images, and what lies in them is listed and plotted. Raises `ValidationError` where
-    there is no such frame or a region does not fit the images, and `ResultError` where the frame failed or is damaged,
-    or the page cannot be written.
+    the name does not end in .html, there is no such frame or a region does not fit the images, and `ResultError` where
+    the frame failed or is damaged, or the page cannot be written.
     """
+    if Path(path).suffix.lower() != ".html":
+        raise ValidationError(f"{path}: the name must end in .html")
     inputs = [str(result.scan.get("source", "")), *([str(result.stored.path)] if result.stored else [])]
     check_output(Path(path), inputs, overwrite)
     write_file(Path(path), report_page(result, frame, regions).encode("utf-8", "backslashreplace"), overwrite)

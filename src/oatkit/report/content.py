@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from oatkit.region_table import RegionOf, region_table
 from oatkit.regions import Region
+from oatkit.regions.table import RegionOf, region_table
 from oatkit.report.charts import Chart
 from oatkit.report.curves import DRAWN_OF_SPEED, DRAWN_OF_WEIGHT, settling, speed_chart, weight_chart
 from oatkit.report.facts import Table, certificates, choice_table, diagnostics, frames, is_number, pairs, said

@@ -8,11 +8,12 @@ import numpy as np
 from oatkit.data import Grid, Image
 from oatkit.regions import Region
 from oatkit.report.facts import plane_name, spaced, titled
-from oatkit.report.pictures import FRACTIONS, UNITS, Bar, Overlay, bar_of, overlay, plane_src, scale_of
+from oatkit.report.pictures import UNITS, Bar, Overlay, bar_of, overlay, plane_src
 from oatkit.report.ticks import plain
 from oatkit.report.verdict import negative_count, share_words
 from oatkit.result import Result
-from oatkit.words import counts_negatives, plane_words
+from oatkit.sheet import scale_of
+from oatkit.words import FRACTIONS, counts_negatives, plane_words
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import Normalize
 
 from oatkit.data import Grid, Image
-from oatkit.page import UNDEFINED, Scale
+from oatkit.page import Scale
 from oatkit.regions import Region
 from oatkit.report.ticks import Axis, linear, plain, round_part
 from oatkit.sheet import Panel
-from oatkit.words import SIGNED
 
-FRACTIONS = ("so2",)
-"""Quantities that lie in 0 .. 1 and are shown in that range, whatever values they take."""
 UNITS = {"m": ("mm", 1e3)}
 """Units that are shown as others, and by how much values grow."""
 BAR = np.linspace(1, 0, 256)[:, None]
@@ -58,14 +53,6 @@ class Overlay:
     ruler_mm: str
     ruler_share: float
     """Length of the scale bar in widths of the picture."""
-
-
-def scale_of(image: Image, planes: np.ndarray) -> Scale:
-    """Return the colours of some planes of `image`: of its whole range where that is known, else of their values."""
-    if image.quantity in FRACTIONS:
-        return Scale(Normalize(0, 1), colormaps["viridis"].with_extremes(bad=UNDEFINED))
-    finite = planes[np.isfinite(planes)].astype(float)
-    return Scale.signed(finite) if image.quantity in SIGNED else Scale.grey(finite)
 
 
 def plane_src(image: Image, index: int, scale: Scale) -> str:

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
-from oatkit.plot import Curve, Plot
-from oatkit.region_table import RegionRow
+from oatkit.plot import Plot
+from oatkit.regions.spectra import spectra
+from oatkit.regions.table import RegionRow, by_image
 from oatkit.report.charts import Chart, chart
 from oatkit.report.facts import Table, said, spaced
 from oatkit.report.ticks import plain
@@ -13,13 +12,8 @@ from oatkit.report.ticks import plain
 
 def spectra_charts(rows: Sequence[RegionRow]) -> Iterator[Chart]:
     """Yield for each image of several wavelengths the mean in each region, with its standard deviation."""
-    for name, found in _by_image(rows).items():
-        if len({row.wavelength_nm for row in found}) > 1:
-            curves = tuple(
-                _curve(region, [row for row in found if row.region == region])
-                for region in dict.fromkeys(row.region for row in found)
-            )
-            yield chart(Plot(f"{spaced(name)}, mean ± standard deviation", curves, "wavelength (nm)", found[0].unit))
+    for name, unit, curves in spectra(rows):
+        yield chart(Plot(f"{spaced(name)}, mean ± standard deviation", curves, "wavelength (nm)", unit))
 
 
 def region_tables(rows: Sequence[RegionRow]) -> Iterator[Table]:
@@ -30,7 +24,7 @@ def region_tables(rows: Sequence[RegionRow]) -> Iterator[Table]:
     sizes = {row.region: (row.region, str(row.pixels), f"{said(row.area_mm2)} mm²") for row in rows[::-1]}
     yield Table("Regions", ("region", "pixels", "area"), tuple(sizes[region] for region in regions))
     alone = []
-    for name, found in _by_image(rows).items():
+    for name, found in by_image(rows).items():
         lines = [(_plane(row[0]), *map(_value, row)) for row in _in_rows(found, len(regions))]
         unit = f" ({found[0].unit})" if found[0].unit else ""
         if len(lines) > 1:
@@ -39,10 +33,6 @@ def region_tables(rows: Sequence[RegionRow]) -> Iterator[Table]:
             alone.append((f"{spaced(name)}{unit}", *lines[0][1:]))
     if alone:
         yield Table("Images of one plane", ("image", *regions), tuple(alone))
-
-
-def _by_image(rows: Sequence[RegionRow]) -> dict[str, list[RegionRow]]:
-    return {name: [row for row in rows if row.image == name] for name in dict.fromkeys(row.image for row in rows)}
 
 
 def _in_rows(rows: Sequence[RegionRow], count: int) -> list[Sequence[RegionRow]]:
@@ -56,9 +46,3 @@ def _plane(row: RegionRow) -> str:
 
 def _value(row: RegionRow) -> str:
     return "undefined" if row.mean is None or row.std is None else f"{plain(row.mean, 4)} ± {plain(row.std, 2)}"
-
-
-def _curve(region: str, rows: Sequence[RegionRow]) -> Curve:
-    points = np.array([(row.wavelength_nm, row.mean, row.std) for row in rows], float)
-    wavelengths, mean, std = points[np.argsort(points[:, 0], kind="stable")].T
-    return Curve(region, wavelengths, mean, spread=std)

@@ -17,7 +17,7 @@ from oatkit.data import Grid, Image
 from oatkit.errors import ValidationError
 from oatkit.names import did_you_mean
 from oatkit.polygons import signed_distance
-from oatkit.regions import EllipseRegion
+from oatkit.shapes import EllipseRegion
 from oatkit.simulate.raster import SAMPLE_M
 from oatkit.spectra import TISSUES, Tissue
 from oatkit.spectra.tables import GRAM_PER_LITRE, GRAM_PER_MOL

@@ -7,9 +7,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from oatkit.csv_table import WAVELENGTH, columns_of, spectra_at
 from oatkit.errors import ValidationError
 from oatkit.names import did_you_mean
+from oatkit.spectra.csv_table import WAVELENGTH, columns_of, spectra_at
 from oatkit.spectra.tables import (
     haemoglobin_molar_absorption,
     icg_relative_absorption,

@@ -33,14 +33,16 @@ class Channels(Preprocessor):
         notes = list(scan.notes)
         if signals.dtype.kind == "f":
             notes.append("channels: saturation cannot be seen, since the signals are no whole numbers.")
+        where: dict[str, list[str]] = {}
         for i, wavelength in enumerate(scan.wavelengths_nm):
             found = dict(self._bad(signals[0, i], judged[i], valid[0, i]))
             for bad in found.values():
                 valid[0, i] &= ~bad
             if found:
-                notes.append(f"channels: not used at {wavelength:g} nm: {_listed(found)}.")
+                where.setdefault(_listed(found), []).append(f"{wavelength:g}")
             if not valid[0, i].any():
                 raise ReadError(f"channels: no channel is left at {wavelength:g} nm ({_listed(found)})")
+        notes += [f"channels: not used at {', '.join(at)} nm: {which}." for which, at in where.items()]
         signals[~valid] = 0
         return replace(scan, signals=signals, valid=valid, notes=tuple(notes))
 
@@ -48,15 +50,16 @@ class Channels(Preprocessor):
         """Yield each fault with the channels that have it, of signals ``(detector, sample)``; each channel once."""
         faults = {"not finite": ~np.isfinite(signals).all(axis=1)}
         usable = valid & ~faults["not finite"]
-        if signals.dtype.kind in "iu":
-            limits = np.iinfo(signals.dtype)
-            at_limit = (judged == limits.min) | (judged == limits.max)
-            faults["saturated"] = at_limit.mean(axis=1) > self.saturated
         spread = np.zeros(len(signals))
         spread[usable] = judged[usable].std(axis=1, dtype=float)
         alive = spread[usable & (spread > 0)]
         typical = float(np.median(alive)) if alive.size else 0.0
+        # Before saturated: all zeros are at a limit, too.
         faults["dead"] = spread <= self.dead * typical
+        if signals.dtype.kind in "iu":
+            limits = np.iinfo(signals.dtype)
+            at_limit = (judged == limits.min) | (judged == limits.max)
+            faults["saturated"] = at_limit.mean(axis=1) > self.saturated
         if self.noisy != "off":
             faults["noisy"] = spread > self.noisy * typical
         left = valid.copy()

@@ -6,6 +6,9 @@ from typing import ClassVar
 from oatkit.api import Preprocessor, ReadError, Scan
 from oatkit.builtin.preprocess.samples import check_offset_removed, finite_samples
 
+MOST_LISTED = 3
+"""Of more energies, the least and the greatest are told."""
+
 
 class Energy(Preprocessor):
     """Divides the signals of each pulse by its relative energy, so that wavelengths compare.
@@ -27,5 +30,8 @@ class Energy(Preprocessor):
             if not 0 < energy < float("inf"):
                 raise ReadError(f"energy: expected a positive pulse energy at {wavelength:g} nm, found {energy:g}")
         divided = (samples / energies[:, None, None]).astype(samples.dtype)
-        note = f"energy: signals were divided by {', '.join(f'{e:.6g}' for e in energies)}."
+        listed = ", ".join(f"{e:.6g}" for e in energies)
+        if len(energies) > MOST_LISTED:
+            listed = f"{energies.min():.6g} .. {energies.max():.6g}, by wavelength"
+        note = f"energy: signals were divided by {listed}."
         return replace(scan, signals=divided, pulse_energy=None, notes=(*scan.notes, note))

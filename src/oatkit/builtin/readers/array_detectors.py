@@ -6,7 +6,7 @@ import numpy as np
 
 from oatkit.builtin.readers.array_tables import MAX_DETECTORS, ArcTable, DetectorsTable
 from oatkit.builtin.readers.number_files import read_numbers
-from oatkit.builtin.readers.plane import extent, flat_axes, seen_along
+from oatkit.builtin.readers.plane import axes_in_plane, flat_axes, seen_along
 from oatkit.data import Detectors
 from oatkit.errors import ReadError, ValidationError
 from oatkit.hostile import inside, printable
@@ -69,15 +69,10 @@ def _axes(path: Path, table: DetectorsTable, count: int) -> tuple[str, ...]:
 
 def _across(path: Path, points_m: np.ndarray, planar: bool) -> tuple[int, list[str]]:
     """Return the axis across the plane in which the detectors lie, with a note where there was one to be found."""
-    flat = flat_axes(points_m)
-    if not flat:
-        raise ReadError(
-            f"{path}: the detectors fill a box of {extent(points_m)} in x, y and z; expected a plane of constant x, y "
-            "or z (3-D arrays are not supported)"
-        )
-    right, up = (axis for number, axis in enumerate(COORDINATES) if number != flat[0])
-    note = f"The detectors lie in a plane of constant {COORDINATES[flat[0]]}: {right} is taken to the right, {up} up."
-    return flat[0], [] if planar else [note]
+    across = flat_axes(points_m, str(path))[0]
+    right, up = (COORDINATES[axis] for axis in axes_in_plane(across))
+    note = f"The detectors lie in a plane of constant {COORDINATES[across]}: {right} is taken to the right, {up} up."
+    return across, [] if planar else [note]
 
 
 def _assumed(table: DetectorsTable, axes: tuple[str, ...]) -> list[str]:

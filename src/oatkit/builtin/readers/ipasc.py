@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any, ClassVar
 
-from oatkit.api import Reader, ReadError, Scan, ValidationError, param
+from oatkit.api import Reader, ReadError, Region, Scan, ValidationError, param
 from oatkit.builtin.readers.hdf5_signals import Hdf5Signals, hdf5_signals
 from oatkit.builtin.readers.ipasc_acquisition import (
     WAVELENGTHS,
@@ -17,6 +17,7 @@ from oatkit.builtin.readers.ipasc_axes import find_axes
 from oatkit.builtin.readers.ipasc_detectors import MAX_MEMBERS, read_detectors
 from oatkit.builtin.readers.ipasc_fields import Fields
 from oatkit.builtin.readers.ipasc_pulses import read_pulses
+from oatkit.builtin.readers.ipasc_regions import read_regions
 from oatkit.hostile import hdf5_dataset, hdf5_group, open_hdf5
 from oatkit.ipasc import ACQUISITION, DEVICE, SIGNALS, is_ipasc_file
 
@@ -44,6 +45,15 @@ class Ipasc(Reader):
                 return self._scan(file, path)
             except ValidationError as error:
                 raise ReadError(f"{path}: {error}") from None
+
+    def regions(self, path: Path) -> tuple[Region, ...]:
+        """Return the regions of interest in the file. Raises `ReadError`."""
+        with open_hdf5(path) as file:
+            detectors, across, _ = read_detectors(hdf5_group(file, DEVICE, MAX_MEMBERS))
+            fields = Fields(hdf5_group(file, ACQUISITION, MAX_MEMBERS))
+            wavelengths, _ = wavelengths_nm(fields, self.wavelength)
+            _, fields = _signals(file, path, fields, detectors.count, len(wavelengths))
+            return read_regions(fields, across)
 
     def _scan(self, file: Any, path: Path) -> Scan:
         device = hdf5_group(file, DEVICE, MAX_MEMBERS)

@@ -89,6 +89,4 @@ def oddities(fields: Fields, shape: tuple[int, ...]) -> list[str]:
     if sizes is not None and sorted(n for n in sizes.ravel() if n != 1) != sorted(n for n in shape if n != 1):
         found = " x ".join(f"{n:g}" for n in sizes.ravel()[:6])
         notes.append(f"The field sizes says {found}, the signals are {' x '.join(map(str, shape))}.")
-    if fields.group.get("regions_of_interest", getlink=True) is not None:
-        notes.append("The file holds regions of interest, which are not read.")
     return notes

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from oatkit.builtin.readers.ipasc_fields import Fields
-from oatkit.builtin.readers.plane import extent, flat_axes, seen_along
+from oatkit.builtin.readers.plane import flat_axes, seen_along
 from oatkit.data import Detectors
 from oatkit.hostile import hdf5_dataset, hdf5_group
 from oatkit.ipasc import MAX_DETECTORS
@@ -49,10 +49,7 @@ def _position(group: Any, name: str) -> list[float]:
 
 def _across(points: np.ndarray, device: Any) -> tuple[int, list[str]]:
     """Return the axis across the image plane, and a note where the positions alone do not tell."""
-    flat = flat_axes(points)
-    if not flat:
-        expected = "detectors in a plane of constant x, y or z (3-D arrays are not supported)"
-        raise Fields(device).error("detectors", expected, f"an array of {extent(points)}")
+    flat = flat_axes(points, f"{device.file.filename} '{device.name}/detectors'")
     if len(flat) == 1:
         return flat[0], []
     hinted = [axis for axis in flat if axis in _flat_in_view(device)]

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from oatkit.api import EllipseRegion, PolygonRegion, RectangleRegion, Region
 from oatkit.errors import ReadError, ValidationError
 from oatkit.hostile import printable, read_at_most
-from oatkit.regions import EllipseRegion, PolygonRegion, RectangleRegion, Region
 
 MAX_BYTES = 16 * 2**20
 MAX_REGIONS = 10_000
@@ -26,19 +26,18 @@ log = logging.getLogger("oatkit")
 def read_annotation(path: Path) -> tuple[Region, ...]:
     """Return the regions in a file by the names ``iAnnotation_<i>/<j>``, counted from 0.
 
-    A straight line has no area: it is left out, with a warning in the log. Raises `ReadError`.
+    A straight line, which has no area, and a region that makes no sense are left out, each with a warning in the log.
+    Raises `ReadError` for a file that holds no list of regions.
     """
     found = []
     for name, entry in _entries(_wrapper(path), path):
         where = f"{path} '{name}'"
         try:
-            region = _region(entry, name, where)
+            found.append(_region(entry, name, where))
+        except ReadError as error:
+            log.warning("%s; it is left out", error)
         except ValidationError as error:
-            raise ReadError(f"{path}: {error}") from None
-        if region is None:
-            log.warning("%s: a straight line has no area; it is left out", where)
-        else:
-            found.append(region)
+            log.warning("%s: %s; it is left out", path, error)
     return tuple(found)
 
 
@@ -68,7 +67,7 @@ def _entries(wrapper: dict[str, Any], path: Path) -> Iterator[tuple[str, dict[st
             yield f"iAnnotation_{i}/{j}", entry
 
 
-def _region(entry: dict[str, Any], name: str, where: str) -> Region | None:
+def _region(entry: dict[str, Any], name: str, where: str) -> Region:
     shape = entry.get("type", "Rectangle")
     if shape not in SHAPES:
         raise ReadError(f"{where}: expected the type {', '.join(SHAPES)} or none, found {printable(repr(shape), 40)}")
@@ -77,8 +76,9 @@ def _region(entry: dict[str, Any], name: str, where: str) -> Region | None:
         if not isinstance(points, list) or not points:
             raise ReadError(f"{where}: expected a list of points, found {printable(repr(points), 40)}")
         x, y_down = np.array([_point(point, where) for point in points]).T
-        has_area = shape == "Polygon" and len(points) > 2
-        return PolygonRegion(name, np.column_stack([-y_down, x])) if has_area else None
+        if shape == "Segment" or len(points) < 3:
+            raise ReadError(f"{where}: a straight line has no area")
+        return PolygonRegion(name, np.column_stack([-y_down, x]))
     kind = EllipseRegion if shape == "Ellipse" else RectangleRegion
     return kind(name, *_placed(entry, where))
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from oatkit.builtin.readers.plane import extent, flat_axes, seen_along
+from oatkit.builtin.readers.plane import flat_axes, seen_along
 from oatkit.builtin.readers.xml_fields import Node
 from oatkit.data import Detectors
 
@@ -57,9 +57,4 @@ def _equally_spaced(equal: Node) -> np.ndarray:
 def _axis_across(points: np.ndarray, description: Node) -> int:
     """Return the axis along which the detectors do not extend; z, then y, where there are several."""
     # Version 2.3 holds the image plane in the first and the third axis, the others in the first and the second.
-    flat = flat_axes(points)
-    if not flat:
-        raise description.error(
-            "detectors in one plane (3-D arrays are not supported)", f"an array of {extent(points)}"
-        )
-    return flat[0]
+    return flat_axes(points, f"{description.where} <{description.path}>")[0]

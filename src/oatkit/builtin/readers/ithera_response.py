@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from oatkit.builtin.readers.response_scale import of_unit_peak
 from oatkit.builtin.readers.xml_fields import Node, local_name
 from oatkit.errors import ReadError
 from oatkit.hostile import inside, read_at_most
@@ -17,8 +18,7 @@ FLAG = 1000.0
 def impulse_response(header: Node, msot: Path, n_samples: int) -> tuple[np.ndarray | None, str]:
     """Return the response, time zero at index ``n // 2``, with a note; None where there is none.
 
-    It is taken from the file ``.irf``, or else from the header itself (version 2.4), and scaled so that the largest
-    magnitude of its spectrum is 1: the vendor's unit is unknown, and so images made with and without it have one scale.
+    It is taken from the file ``.irf``, or else from the header itself (version 2.4), and scaled by `of_unit_peak`.
     Raises `ReadError` where it does not hold one finite number for each of `n_samples`.
     """
     content, origin = _content(header, msot, 8 * n_samples)
@@ -36,12 +36,12 @@ def centred(values: np.ndarray, origin: str) -> tuple[np.ndarray, str]:
     """
     if values[0] >= FLAG:
         values[0] -= FLAG
-    scale = _largest_magnitude(values, origin)
+    scaled, scale = of_unit_peak(values, origin)
     middle = len(values) // 2
     in_place = abs(int(np.argmax(abs(values))) - middle) <= len(values) // 4
     moved = "" if in_place else ", moved from index 0 (where its peak is) to the centre"
-    values = values if in_place else np.fft.fftshift(values)
-    return values / scale, f"Impulse response from {Path(origin).name}, divided by {scale:.4g}{moved}."
+    scaled = scaled if in_place else np.fft.fftshift(scaled)
+    return scaled, f"Impulse response from {Path(origin).name}, divided by {scale:.4g}{moved}."
 
 
 def _content(header: Node, msot: Path, expected: int) -> tuple[bytes | None, str]:
@@ -58,13 +58,3 @@ def _content(header: Node, msot: Path, expected: int) -> tuple[bytes | None, str
         return base64.b64decode("".join(embedded[0].split()), validate=True), origin
     except (binascii.Error, ValueError):
         raise ReadError(f"{origin}: expected base64, found {embedded[0][:20]!r} ...") from None
-
-
-def _largest_magnitude(values: np.ndarray, origin: str) -> float:
-    """Return the largest magnitude of the spectrum. Raises `ReadError` where it is no positive number."""
-    if not np.isfinite(values).all():
-        raise ReadError(f"{origin}: expected finite numbers, found {(~np.isfinite(values)).sum()} that are not")
-    largest = float(np.max(abs(np.fft.rfft(values))))
-    if not 0 < largest < float("inf"):
-        raise ReadError(f"{origin}: expected an impulse response, found only zeros or numbers out of range")
-    return largest

@@ -14,7 +14,7 @@ from oatkit.builtin.readers.patato_layout import RAW_DATA, has, has_layout, numb
 from oatkit.builtin.readers.patato_pulses import optional, pulses, scan_wavelengths
 from oatkit.builtin.readers.patato_regions import regions
 from oatkit.builtin.readers.patato_speed import speed_of_sound
-from oatkit.builtin.readers.plane import extent, flat_axes, seen_along
+from oatkit.builtin.readers.plane import flat_axes, seen_along
 from oatkit.hostile import hdf5_dataset, open_hdf5
 from oatkit.scanfile import MAX_ARRAY_BYTES
 
@@ -105,13 +105,7 @@ def _detectors(file: Any, path: Path) -> Detectors:
         return Detectors(points[:, ::-1])
     if points.shape[1] != 3 or not len(points):
         raise ReadError(f"{path} 'GEOMETRY': expected detectors as (x, y, z), found the shape {points.shape}")
-    flat = flat_axes(points)
-    if not flat:
-        raise ReadError(
-            f"{path} 'GEOMETRY': expected detectors in one plane (3-D arrays are not supported), found an array of "
-            f"{extent(points)}"
-        )
-    return seen_along(points, flat[0])
+    return seen_along(points, flat_axes(points, f"{path} 'GEOMETRY'")[0])
 
 
 def _sampling_rate_hz(file: Any, path: Path) -> float:

@@ -8,14 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from oatkit.api import Calibration, Image, UnmixProblem, ValidationError, param
-from oatkit.builtin.unmixers.coarse_light import CoarseLight
 from oatkit.builtin.unmixers.mixture import Mixture
 from oatkit.builtin.unmixers.nonnegative import nonnegative
 from oatkit.builtin.unmixers.saturation import total_and_saturation
 from oatkit.builtin.unmixers.self_calibration import by_spectra, by_spectra_near
-from oatkit.builtin.unmixers.settling import Passes, Settled
 from oatkit.builtin.unmixers.spectral import Fit, SpectralUnmixer
-from oatkit.plausible import implausible
+from oatkit.light import CoarseLight, Passes, Settled, implausible
 
 
 class FluenceCorrected(SpectralUnmixer):
@@ -105,7 +103,7 @@ class FluenceCorrected(SpectralUnmixer):
         pressure, state = problem.initial_pressure, settled.state
         facts = {
             "passes": settled.passes,
-            "change": settled.changes,
+            "change": settled.largest,
             "settled": settled.converged,
             "diverged": settled.diverged,
             "calibration": state.calibration,
@@ -159,5 +157,5 @@ def _notes(problem: UnmixProblem, settled: Settled) -> Iterator[str]:
     elif settled.changes and not settled.converged:
         yield (
             f"the last of {settled.passes} passes between absorption and light changed the absorption by "
-            f"{settled.changes[-1]:.1%}; raise unmix.passes"
+            f"{settled.largest[-1]:.1%}; raise unmix.passes"
         )

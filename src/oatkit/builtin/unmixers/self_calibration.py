@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from oatkit.api import Calibration
-from oatkit.builtin.unmixers.settling import Passes, Settled
+from oatkit.light import Passes, Settled
 
 STEP = 1.4
 """Factor between the calibrations that are tried."""

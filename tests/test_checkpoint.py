@@ -1,0 +1,51 @@
+"""Long work can be stopped between its passes, in its own thread and nowhere else."""
+
+import threading
+
+import pytest
+
+from oatkit.checkpoint import at_checkpoints, checkpoint
+
+
+class Stop(Exception):
+    """What a test raises."""
+
+
+def stop():
+    """Ask the work to end."""
+    raise Stop
+
+
+def test_a_checkpoint_does_nothing_unless_asked():
+    """Outside of `at_checkpoints`, and after it, a checkpoint does nothing."""
+    checkpoint()
+    with pytest.raises(Stop), at_checkpoints(stop):
+        checkpoint()
+    checkpoint()
+
+
+def test_checkpoints_of_another_thread_are_left_alone():
+    """What is asked for in one thread does not stop another."""
+    reached = []
+
+    def work():
+        checkpoint()
+        reached.append(True)
+
+    with at_checkpoints(stop):
+        thread = threading.Thread(target=work)
+        thread.start()
+        thread.join()
+    assert reached == [True]
+
+
+def test_solving_passes_a_checkpoint_at_each_step():
+    """`Solver.solve` can be stopped after any iterate."""
+    import numpy as np
+
+    import oatkit
+    from oatkit.api import Problem
+
+    problem = Problem(np.eye(9), np.ones(9), (3, 3))
+    with pytest.raises(Stop), at_checkpoints(stop):
+        oatkit.plugin("solver", "lsqr")(weight=0.1).solve(problem)
