@@ -33,6 +33,7 @@ COMMANDS = (
     "challenge",
     "kinetics",
     "report",
+    "gui",
 )
 
 

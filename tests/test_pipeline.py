@@ -166,3 +166,10 @@ def test_a_wrong_parameter_in_python_is_the_same_error():
     with pytest.raises(ValidationError) as caught:
         plugin("solver", "maxent-nlcg")(weight=-1.0, prior=float("nan"), wieght=2)
     assert len(str(caught.value).splitlines()) == 3
+
+
+def test_an_empty_right_side_takes_a_key_out():
+    """`--set slot.key=` leaves the default of the plugin in force, whether or not the preset had a value."""
+    there, absent = (Pipeline.load("maxent-absorption", [f"fluence.{key}="]) for key in ("ring_radius", "index_body"))
+    assert there.fluence.ring_radius is None
+    assert absent == Pipeline.load("maxent-absorption")

@@ -12,6 +12,7 @@ from oatkit.builtin.forward.arc import Arc
 from oatkit.builtin.preprocess.band_pass import BandPass
 from oatkit.builtin.preprocess.channels import Channels
 from oatkit.builtin.preprocess.energy import Energy
+from oatkit.builtin.preprocess.invert import Invert
 from oatkit.builtin.preprocess.offset import Offset
 from oatkit.builtin.preprocess.transient import Transient
 from oatkit.builtin.readers.ithera import IThera
@@ -400,3 +401,14 @@ def test_an_energy_that_is_not_positive_is_refused(energy):
     """With the wavelength at which it was found."""
     with pytest.raises(ReadError, match="expected a positive pulse energy at 710 nm"):
         Energy().process(scan_of(noise(), [1, energy]))
+
+
+def test_inverting_twice_changes_nothing(small_scan):
+    """`invert` gives the negative signals, of whole numbers too, without wrapping; twice gives the signals back."""
+    invert = Invert()
+    whole = replace(small_scan, signals=np.arange(2 * 48 * 400, dtype=np.uint16).reshape(2, 1, 48, 400))
+    for scan in (small_scan, whole):
+        once = invert.process(scan)
+        assert (once.signals == -np.asarray(scan.signals, float)).all()
+        assert (invert.process(once).signals == scan.signals).all()
+        assert "multiplied by -1" in once.notes[-1]

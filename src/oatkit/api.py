@@ -154,8 +154,9 @@ class Solver(Plugin):
     def solve(self, problem: Problem) -> Iterate:
         """Run to the end and return the last state."""
         last = None
-        for last in self.iterate(problem):
+        for state in self.iterate(problem):
             checkpoint()
+            last = state
         if last is None:
             raise PluginError(f"solver '{self.name}' ended without yielding an image")
         return last

@@ -114,8 +114,9 @@ def preset(name: str) -> str:
 def set_value(table: dict[str, Any], change: str) -> None:
     """Apply ``slot.key=value`` to a pipeline's table in place.
 
-    The right side is read as a TOML value, else as a bare word. A step of ``preprocess`` is addressed by its plugin's
-    name. A change of ``use`` drops the other keys of the old plugin. Raises `ValidationError`.
+    The right side is read as a TOML value, else as a bare word; an empty one takes the key out, so that the default
+    holds. A step of ``preprocess`` is addressed by its plugin's name. A change of ``use`` drops the other keys of the
+    old plugin. Raises `ValidationError`.
     """
     path, equals, text = change.partition("=")
     keys = path.strip().split(".")
@@ -129,7 +130,10 @@ def set_value(table: dict[str, Any], change: str) -> None:
         )
     if keys[-1] == "use":
         table.clear()
-    table[keys[-1]] = _value(text.strip())
+    if text.strip():
+        table[keys[-1]] = _value(text.strip())
+    else:
+        table.pop(keys[-1], None)
 
 
 def _descend(table: Any, key: str, change: str) -> Any:

@@ -155,10 +155,11 @@ def _plot_width(plot: Plot) -> int:
 
 
 def _legend(groups: Sequence[Sequence[Panel]]) -> str:
-    if not any(groups):
-        return ""
-    greys = f"greys from 0 to the {PERCENTILE}th percentile"
-    return f"red: negative · {greys}" if any(panel.negative.any() for group in groups for panel in group) else greys
+    panels = [panel for group in groups for panel in group]
+    words = ["red: negative"] if any(panel.negative.any() for panel in panels) else []
+    if any(panel.image.quantity not in (*FRACTIONS, *SIGNED) for panel in panels):
+        words.append(f"greys from 0 to the {PERCENTILE}th percentile")
+    return " · ".join(words)
 
 
 def _draw_block(page: Page, block: Block, left: int, top: int) -> None:

@@ -32,10 +32,11 @@ def oatkit_preprocessors() -> list[type[Preprocessor]]:
     from oatkit.builtin.preprocess.band_pass import BandPass
     from oatkit.builtin.preprocess.channels import Channels
     from oatkit.builtin.preprocess.energy import Energy
+    from oatkit.builtin.preprocess.invert import Invert
     from oatkit.builtin.preprocess.offset import Offset
     from oatkit.builtin.preprocess.transient import Transient
 
-    return [Offset, Transient, Channels, BandPass, Energy]
+    return [Offset, Transient, Channels, BandPass, Energy, Invert]
 
 
 @hookimpl

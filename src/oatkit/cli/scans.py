@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from oatkit.cli.app import AsJson, Changes, Overwrite, ScanPath, check_new, command, frames_in
+from oatkit.cli.app import AsJson, Changes, Overwrite, ScanPath, check_new, command, complain, frames_in
 from oatkit.data import Image, Scan
 from oatkit.errors import SolverError, ValidationError
 
@@ -64,6 +64,8 @@ def run(
     for line in summary(result):
         typer.echo(line)
     typer.echo(f"wrote {output} in {time.perf_counter() - start:.1f} s")
+    for reason in result.failed.values():
+        complain(reason)
     if result.failed:
         raise SolverError(f"{len(result.failed)} of {result.frames} frames failed")
 
@@ -164,7 +166,7 @@ def simulate(
     typer.echo(f"wrote {output}: {phantom.value} phantom, {snr:g} dB, seed {seed}")
     if phantom is Phantom.OXYGEN:
         # The preset is for scanners, whose light comes through water; K is 1 here, and found only without that.
-        clear = "--set fluence.use=diffusion-fvm --set fluence.band_width=8"
+        clear = "--set fluence.ring_radius="
         typer.echo(f"note: the water takes no light here: oatkit run multispectral {output} -o OUT.zarr {clear}")
 
 
