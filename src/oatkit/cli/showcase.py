@@ -34,7 +34,7 @@ def paper(
         "oatkit-paper"
     ),
     scan: Annotated[
-        Path | None, typer.Option(metavar="SCAN", help="A real scan of a mouse, for fig5, fig6 and table1.")
+        Path | None, typer.Option(metavar="SCAN", help="A real scan of a mouse, for fig5, fig6, fig7 and table1.")
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
