@@ -298,6 +298,15 @@ def test_loops_and_rules_are_drawn_from_what_they_recorded():
     assert curves == [3, 3, 4, 5]
 
 
+def test_the_search_for_a_calibration_is_drawn():
+    """Each calibration that was tried is a point of one curve, and the one that was found is named."""
+    choice = {"calibration": 0.25, "tried": (0.1, 0.25, 0.5, 1.0), "misfit": (0.2, 0.01, 0.3, 0.4), "notes": ()}
+    read = Reading(report_page(replace(whole(), calibration_choice=choice)))
+    assert 4 in [len((line["points"] or "").split()) for line in read.all("polyline")]
+    assert "Calibration by the spectra" in read.text
+    assert "K 0.25 a.u. m" in read.text
+
+
 def test_frames_that_failed_are_listed(tmp_path):
     """A result of many frames shows the first good one, or the one asked for, and says which failed and why."""
     stored = load(write_frames(tmp_path / "out.zarr", "dark", "dark", make_result(2), make_result(3)))

@@ -6,7 +6,15 @@ from dataclasses import dataclass
 from oatkit.regions import Region
 from oatkit.regions.table import RegionOf, region_table
 from oatkit.report.charts import Chart
-from oatkit.report.curves import DRAWN_OF_SPEED, DRAWN_OF_WEIGHT, settling, speed_chart, weight_chart
+from oatkit.report.curves import (
+    DRAWN_OF_CALIBRATION,
+    DRAWN_OF_SPEED,
+    DRAWN_OF_WEIGHT,
+    calibration_chart,
+    settling,
+    speed_chart,
+    weight_chart,
+)
 from oatkit.report.facts import Table, certificates, choice_table, diagnostics, frames, is_number, pairs, said
 from oatkit.report.gallery import Group, groups
 from oatkit.report.listing import ListingLine, listing
@@ -57,7 +65,11 @@ def content_of(result: Result, regions: Sequence[RegionOf]) -> Content:
     """Return the content of a report on the frame that `result` shows."""
     placed = [region if isinstance(region, Region) else region(result) for region in regions]
     rows = region_table(dict(result), placed)
-    choices = (weight_chart(result.weight_choice), speed_chart(result.speed_choice))
+    choices = (
+        weight_chart(result.weight_choice),
+        speed_chart(result.speed_choice),
+        calibration_chart(result.calibration_choice),
+    )
     return Content(
         title=str(result.scan.get("name") or "Reconstruction"),
         subtitle=f"Frame {result.frame_index} of the scan"
@@ -80,7 +92,7 @@ def content_of(result: Result, regions: Sequence[RegionOf]) -> Content:
 
 def _warnings(result: Result) -> tuple[str, ...]:
     """Return all notes of the run and of its choices, each once."""
-    choices = (result.weight_choice, result.speed_choice)
+    choices = (result.weight_choice, result.speed_choice, result.calibration_choice)
     found = [choice.get("notes") for choice in choices]
     notes = [str(note) for part in found if isinstance(part, tuple | list) for note in part]
     return tuple(dict.fromkeys([*result.warnings, *notes]))
@@ -114,6 +126,7 @@ def _choices(result: Result) -> list[Table]:
     known = (
         ("Choice of the weight", result.weight_choice, DRAWN_OF_WEIGHT),
         ("Choice of the speed of sound", result.speed_choice, DRAWN_OF_SPEED),
+        ("Choice of the calibration", result.calibration_choice, DRAWN_OF_CALIBRATION),
     )
     return [choice_table(caption, choice, drawn) for caption, choice, drawn in known if choice]
 

@@ -13,6 +13,7 @@ from oatkit.result import Result
 
 DRAWN_OF_WEIGHT = ("curve",)
 DRAWN_OF_SPEED = ("speeds_m_s", "scores")
+DRAWN_OF_CALIBRATION = ("tried", "misfit")
 """What of a choice is drawn, so that no table repeats it."""
 
 
@@ -66,6 +67,17 @@ def speed_chart(choice: Mapping[str, Any]) -> Chart | None:
     verticals = tuple((choice[key], f"{word} {choice[key]:.1f}") for key, word in lines if is_number(choice.get(key)))
     labels = ("speed of sound (m/s)", "sharpness, scaled to 0 .. 1")
     return chart(Plot("Speed of sound by focus", curves, *labels, verticals=verticals))
+
+
+def calibration_chart(choice: Mapping[str, Any]) -> Chart | None:
+    """Draw how badly each calibration that was tried explains the pressure; None where that was not recorded."""
+    tried, misfit = (numbers(choice.get(key, ())) for key in ("tried", "misfit"))
+    if not tried.size or tried.shape != misfit.shape or tried.ndim != 1:
+        return None
+    found = choice.get("calibration")
+    verticals = ((found, f"K {found:.3g} a.u. m"),) if is_number(found) else ()
+    labels = ("calibration K (a.u. m)", "misfit, relative to the pressure")
+    return chart(Plot("Calibration by the spectra", (Curve("", tried, misfit),), *labels, "xy", verticals=verticals))
 
 
 def _scaled(values: np.ndarray) -> np.ndarray:

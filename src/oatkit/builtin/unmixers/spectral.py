@@ -78,20 +78,21 @@ class Fit:
     def images(self, so2_floor: float, found: Mapping[str, Any], notes: tuple[str, ...] = ()) -> dict[str, Image]:
         """Return an image of each chromophore, of what follows from haemoglobin, and of the residual.
 
-        `found` joins the diagnostics of each, `notes` those of the first.
+        `found` joins the diagnostics of ``so2`` and of the first, `notes` those of the first.
         """
         by_name = dict(zip(self.mixture.names, self.concentrations, strict=True))
         scaled = self.absorption.unit == "1/m"
         units = {one.name: one.unit if scaled else "a.u." for one in self.mixture.chromophores}
         units |= {"total_haemoglobin": units.get("oxyhaemoglobin", ""), "so2": ""}
-        facts = {"fitted_to": self.absorption.quantity, "condition": self.mixture.condition, **found}
+        facts = {"fitted_to": self.absorption.quantity, "condition": self.mixture.condition}
         made = {name: self._image(name, units[name], plane, facts) for name, plane in by_name.items()}
         for name, plane, least in total_and_saturation(by_name, so2_floor):
-            made[name] = self._image(name, units[name], plane, {**facts, "least_haemoglobin": least})
+            more = found if name == "so2" else {}
+            made[name] = self._image(name, units[name], plane, {**facts, **more, "least_haemoglobin": least})
         made["residual"] = self._image("residual", "", self.residual(), facts)
         first = next(iter(made))
         made[first] = self._image(
-            first, units[first], by_name[first], {**facts, "notes": (*self.mixture.notes, *notes)}
+            first, units[first], by_name[first], {**facts, **found, "notes": (*self.mixture.notes, *notes)}
         )
         return made
 
