@@ -20,6 +20,8 @@ from oatkit.result import Result
 from oatkit.store import StoreWriter
 
 FRAMES, PIXELS = 100, 200
+PAUSE_S = 0.05
+"""Between steps of a hand; meanwhile the next frame is read."""
 WAVELENGTHS_NM = tuple(np.linspace(660.0, 980.0, 28))
 
 
@@ -33,10 +35,11 @@ def write(path: Path) -> None:
             writer.write(frame, Result(images, frame_index=frame))
 
 
-def step_ms(viewer, axis: int, steps: range) -> str:
+def step_ms(viewer, axis: int, steps: range, pause_s: float = 0.0) -> str:
     """Move a slider, and time each step: on the clock, and of the processor, which other programs do not slow."""
     clock, processor = [], []
     for step in steps:
+        time.sleep(pause_s)
         start = time.perf_counter(), time.process_time()
         viewer.dims.set_current_step(axis, step)
         get_qapp().processEvents()  # paints the canvas
@@ -55,8 +58,9 @@ def main() -> None:
         open_path(workbench(viewer), path)
         print(f"opened in {time.perf_counter() - start:.2f} s")
         print("wavelength:", step_ms(viewer, 1, range(1, 28)))
-        print("frame:", step_ms(viewer, 0, range(1, 60)))
-        print("frame seen before:", step_ms(viewer, 0, range(58, 45, -1)))
+        print("frame, 20 a second or less:", step_ms(viewer, 0, range(1, 50), PAUSE_S))
+        print("frame, without a pause:", step_ms(viewer, 0, range(50, 90)))
+        print("frame seen before:", step_ms(viewer, 0, range(88, 75, -1)))
         viewer.close()
 
 

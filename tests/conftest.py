@@ -1,12 +1,44 @@
 """Fixtures shared by the tests."""
 
 import os
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
 SHARED = Path(os.environ.get("OATKIT_SHARED", Path(__file__).parents[2] / "shared"))
 """A folder of real data that is not part of the repository."""
+
+
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+WINDOWS = {"qapp", "qtbot", "make_napari_viewer", "make_napari_viewer_proxy"}
+"""Fixtures that need a display."""
+NO_DISPLAY = """needs a display, or Xvfb; on Debian: apt-get install xvfb libfontconfig1 libgl1 libegl1 libglib2.0-0 \
+libdbus-1-3 libxkbcommon0 libxkbcommon-x11-0 libxcb-cursor0 libxcb-icccm4 libxcb-keysyms1 libxcb-shape0"""
+
+# Before anything imports Qt, which without a display would abort the whole run. pytest-xvfb starts Xvfb by itself.
+NO_WINDOWS = os.environ.get("OATKIT_NO_WINDOWS") or not shutil.which("Xvfb")
+if sys.platform.startswith("linux") and NO_WINDOWS and not any(os.environ.get(d) for d in DISPLAYS):
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A warning of Qt (a layer added by a thread, say) fails a test of windows."""
+    for item in items:
+        if WINDOWS & set(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.qt_log_level_fail("WARNING"))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Without a display a test of windows is skipped; in CI it fails, unless tests/run.sh could get none."""
+    if not WINDOWS & set(getattr(item, "fixturenames", ())):
+        return
+    if os.environ.get("OATKIT_NO_WINDOWS"):
+        pytest.skip(NO_DISPLAY)
+    if os.environ.get("QT_QPA_PLATFORM") == "offscreen":
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(NO_DISPLAY)
 
 
 @pytest.fixture(scope="session")

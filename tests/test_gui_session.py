@@ -5,21 +5,11 @@ import time
 import pytest
 
 import oatkit
+from gui_sessions import small_session
 from oatkit.errors import SolverError, ValidationError
 from oatkit.events import StepDone
-from oatkit.gui.document import PipelineDocument
 from oatkit.gui.job import Job
 from oatkit.gui.session import Converging, Finished, Session
-
-SMALL = {"pixels": 32, "field_of_view_mm": 9.0}
-
-
-def small_session(scan, preset="lsqr"):
-    """A session on a small scan."""
-    session = Session(PipelineDocument.of_preset(preset), scan)
-    for key, value in SMALL.items():
-        session.document.set("grid", key, value)
-    return session
 
 
 def finished(job):

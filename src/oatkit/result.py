@@ -29,6 +29,10 @@ class Frames(Protocol):
         """Why frames failed."""
         ...
 
+    def image(self, index: int, name: str) -> Image:
+        """Read one image of one frame."""
+        ...
+
     def read(self, index: int) -> "Result":
         """Read one frame."""
         ...

@@ -1,5 +1,6 @@
 """A pipeline as the text that its author wrote: edited without losing comments, with undo and redo."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ class PipelineDocument:
 
     def __init__(self, text: str, folder: Path = Path()) -> None:
         self.folder = folder
+        self.path: Path | None = None
+        """The file that it was opened from, or last saved to."""
         self.pipeline = self._parsed(text)
         self._texts, self._at = [text], 0
         self._saved = text
@@ -33,9 +36,11 @@ class PipelineDocument:
     def open(cls, path: Path) -> "PipelineDocument":
         """Open a pipeline file. Raises `ValidationError`."""
         try:
-            return cls(path.read_bytes().decode("utf-8-sig"), path.parent)
+            opened = cls(path.read_bytes().decode("utf-8-sig"), path.parent)
         except (OSError, UnicodeDecodeError) as error:
             raise ValidationError(f"{path}: not a readable text file: {error}") from None
+        opened.path = path
+        return opened
 
     @property
     def text(self) -> str:
@@ -52,16 +57,19 @@ class PipelineDocument:
         from oatkit.atomic import write_file
 
         write_file(path, self.text.encode(), overwrite=True)
-        self._saved = self.text
+        self._saved, self.path = self.text, path
 
     def set(self, slot: str, key: str, value: Any, part: str = "", index: int | None = None) -> None:
         """Set a parameter of a step; `part` names a nested plugin (a solver's regularizer), `index` a preprocess step.
+
+        A plugin nested deeper is named by the way to it: ``"regularizer.inner"``.
 
         Setting ``use`` takes another plugin, and drops the keys of the old one. A value of None removes the key.
         """
         document = self._document()
         table = _table(document, slot, index)
-        table = _nested(table, part) if part else table
+        for name in part.split(".") if part else ():
+            table = _nested(table, name)
         if key == "use":
             for old in [name for name in table if name != "use"]:
                 del table[old]
@@ -70,6 +78,10 @@ class PipelineDocument:
         else:
             table[key] = _plain(value)
         self._take(tomlkit.dumps(document))
+
+    def replace(self, text: str) -> None:
+        """Take another text in place of this one, as an edit that can be undone."""
+        self._take(text)
 
     def add(self, slot: str, use: str | None = None) -> None:
         """Add a step to the end of ``preprocess``, or switch a later one on."""
@@ -80,7 +92,7 @@ class PipelineDocument:
             steps.append(table)
         else:
             document[slot] = table
-        self._take(tomlkit.dumps(document))
+        self._take(_spaced(tomlkit.dumps(document)))
 
     def remove(self, slot: str, index: int | None = None) -> None:
         """Remove a step."""
@@ -94,13 +106,13 @@ class PipelineDocument:
     def move(self, index: int, to: int) -> None:
         """Move a step of ``preprocess``."""
         document = self._document()
-        steps = [dict(step) for step in document["preprocess"]]
+        steps = list(document["preprocess"])
         steps.insert(to, steps.pop(index))
         array = tomlkit.aot()
         for step in steps:
-            array.append(tomlkit.item(step))
+            array.append(step)
         document["preprocess"] = array
-        self._take(tomlkit.dumps(document))
+        self._take(_spaced(tomlkit.dumps(document)))
 
     @property
     def can_undo(self) -> bool:
@@ -153,6 +165,29 @@ def _nested(table: Any, part: str) -> Any:
     if not isinstance(table.get(part), Mapping):
         table[part] = tomlkit.inline_table()
     return table[part]
+
+
+def _spaced(text: str) -> str:
+    """Put one blank line before each table, or before the comment above it: what was moved brings several, or none."""
+    lines: list[str] = []
+    for line in text.splitlines():
+        if re.match(r"\[\[?[A-Za-z]", line):
+            comment = _comment_above(lines)
+            while lines and not lines[-1].strip():
+                lines.pop()
+            lines += ["", *comment] if lines else comment
+        lines.append(line)
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _comment_above(lines: list[str]) -> list[str]:
+    """Take the comment off the end of `lines` that has a blank line before it, and return it."""
+    at = len(lines)
+    while at and lines[at - 1].startswith("#"):
+        at -= 1
+    comment = lines[at:] if at and not lines[at - 1].strip() else []
+    del lines[len(lines) - len(comment) :]
+    return comment
 
 
 def _plain(value: Any) -> Any:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from oatkit.checkpoint import at_checkpoints
 from oatkit.errors import OatkitError
 
 PATIENCE_S = 5.0
@@ -22,7 +23,7 @@ class Failure:
     """The traceback, to copy."""
 
 
-class Cancelled(Exception):
+class Cancelled(BaseException):
     """The job was asked to stop."""
 
 
@@ -39,6 +40,8 @@ class Job:
         self._stop = threading.Event()
         self._ended = threading.Event()
         self.failure: Failure | None = None
+        self.newest: Any = None
+        """Set by the work: what only the newest of is worth looking at."""
         self._thread = threading.Thread(target=self._run, name="oatkit job", daemon=True)
 
     def start(self) -> "Job":
@@ -82,18 +85,20 @@ class Job:
 
     def _run(self) -> None:
         try:
-            for item in self._work(self):
-                self._items.append(item)
-                self.check()
+            with at_checkpoints(self.check):
+                for item in self._work(self):
+                    self._items.append(item)
+                    self.check()
         except Cancelled:
             pass
         except BaseException as error:  # a plugin may raise anything, SystemExit too
-            self.failure = _failure(error)
+            self.failure = failure_of(error)
         finally:
             self._ended.set()
 
 
-def _failure(error: BaseException) -> Failure:
+def failure_of(error: BaseException) -> Failure:
+    """Return an error as a sentence and its traceback."""
     known = isinstance(error, OatkitError)
     sentence = str(error) if known else f"{type(error).__name__}: {error}"
     return Failure(sentence, "".join(traceback.format_exception(error)))

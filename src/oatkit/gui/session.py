@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from oatkit.data import Image, Scan
 from oatkit.engine import run_resolved
 from oatkit.errors import ValidationError
@@ -21,6 +23,18 @@ from oatkit.rules import resolve
 FIRST_STEPS = ("preprocess", "reconstruct")
 SLOTS = ("preprocess", "forward", "reconstruct", *STEPS)
 """The steps of a pipeline in their order."""
+
+
+@dataclass(frozen=True)
+class Converging:
+    """The numbers of a solver's step; its image is the job's `newest`."""
+
+    wavelength_nm: float
+    iteration: int
+    residual_norm: float
+    relative_gap: float
+    negative_share: float
+    """Of all pixels, 0 .. 1."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +62,12 @@ class Session:
 
     def open_scan(self, path: str | Path) -> Scan:
         """Open a scan and go to its first frame. Raises `ReadError`."""
-        self.scan, self.frame, self.result = read(path), 0, None
-        return self.scan
+        self.take_scan(scan := read(path))
+        return scan
+
+    def take_scan(self, scan: Scan) -> None:
+        """Work on a scan that is at hand, beginning with its first frame."""
+        self.scan, self.frame, self.result = scan, 0, None
 
     def go_to_frame(self, frame: int) -> None:
         """Take another frame of the scan. Raises `ValidationError` where there is none."""
@@ -70,11 +88,17 @@ class Session:
         def work(job: Job) -> Iterator[Any]:
             def tell(event: Event) -> None:
                 job.check()
-                job.show(event)
+                if isinstance(event, StepIterate):
+                    # Images would pile up where a window is slow: of them only the newest waits.
+                    job.newest = event
+                    job.show(_numbers(event))
+                else:
+                    job.show(event)
 
             resolved = resolve(pipeline, scan, self.memo, tell, frame)
             job.check()
             result = run_resolved(resolved, scan, frame, self.memo, tell)
+            job.check()
             self.result = result
             yield Finished(result)
 
@@ -84,6 +108,23 @@ class Session:
         if self.scan is None:
             raise ValidationError("no scan is open: drag one into the window, or open the sample")
         return self.scan
+
+
+def _numbers(event: StepIterate) -> Converging:
+    state = event.iterate
+    return Converging(
+        event.wavelength_nm,
+        state.iteration,
+        state.residual_norm,
+        state.relative_gap,
+        float(np.mean(np.asarray(state.image) < 0)),
+    )
+
+
+def image_of(event: StepIterate, pipeline: Pipeline) -> Image:
+    """Return the image of a solver's step, to look at while it converges."""
+    values = np.asarray(event.iterate.image, dtype=np.float32)
+    return Image(values, "initial_pressure", "a.u.", pipeline.grid.grid(), (event.wavelength_nm,))
 
 
 def _up_to(pipeline: Pipeline, last: str | None) -> Pipeline:

@@ -1,12 +1,12 @@
 """What all widgets of one viewer share: the session, the layers, and signals when something changed."""
 
 from typing import Any
-from weakref import WeakKeyDictionary
 
 from psygnal import Signal
 
 from oatkit.gui.layers import Layers
 from oatkit.gui.session import Session
+from oatkit.gui.viewing import Viewing
 
 
 class Workbench:
@@ -20,15 +20,19 @@ class Workbench:
     """A run has ended with images."""
 
     def __init__(self, viewer: Any) -> None:
+        self.viewer = viewer
         self.session = Session()
         self.layers = Layers(viewer)
+        self.viewing = Viewing(viewer, self.layers)
 
 
-_benches: WeakKeyDictionary[Any, Workbench] = WeakKeyDictionary()
+NAME = "_oatkit_workbench"
 
 
 def workbench(viewer: Any) -> Workbench:
     """Return the workbench of a viewer, made at the first call; widgets that are opened later join it."""
-    if viewer not in _benches:
-        _benches[viewer] = Workbench(viewer)
-    return _benches[viewer]
+    viewer = getattr(viewer, "__wrapped__", viewer)  # napari hands a proxy to widgets
+    # The viewer itself holds it: a dictionary here would keep every viewer alive, since a workbench refers to its own.
+    if NAME not in viewer.__dict__:
+        viewer.__dict__[NAME] = Workbench(viewer)
+    return viewer.__dict__[NAME]

@@ -75,7 +75,7 @@ def calibration_chart(choice: Mapping[str, Any]) -> Chart | None:
     if not tried.size or tried.shape != misfit.shape or tried.ndim != 1:
         return None
     found = choice.get("calibration")
-    verticals = ((found, f"K {found:.3g} a.u. m"),) if is_number(found) else ()
+    verticals = ((float(found), f"K {found:.3g} a.u. m"),) if found is not None and is_number(found) else ()
     labels = ("calibration K (a.u. m)", "misfit, relative to the pressure")
     return chart(Plot("Calibration by the spectra", (Curve("", tried, misfit),), *labels, "xy", verticals=verticals))
 
