@@ -26,7 +26,7 @@ def can_open(path: Path) -> bool:
 
 
 def open_path(bench: Workbench, path: Path) -> None:
-    """Open a scan, whose coarse back-projection is shown soon after, a result, or a pipeline, known by its content.
+    """Open a scan, of which a coarse picture is shown soon after, a result, or a pipeline, known by its content.
 
     Raises `ReadError`, `ResultError` or `ValidationError`.
     """

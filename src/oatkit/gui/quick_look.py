@@ -1,4 +1,4 @@
-"""A first picture of a scan, in a moment: its coarse back-projection."""
+"""A first picture of a scan, in a moment: coarse, but not negative."""
 
 from typing import Any
 
@@ -9,16 +9,19 @@ from oatkit.engine import run
 from oatkit.pipeline import Pipeline
 
 PIXELS = 100
+STEPS = 12
+"""Of non-negative least squares, which has not converged by then, but shows what is there."""
 BAND_MHZ = 2.5
 """What so few pixels can hold over the field of view of the presets."""
 
 
 def quick_look(scan: Scan, frame: int, pipeline: Pipeline) -> Image:
-    """Return the back-projection of a frame over the field of view, and with the speed of sound, of a pipeline.
+    """Return a coarse image of a frame over the field of view of a pipeline.
 
     Raises what running a pipeline raises.
     """
-    coarse = Pipeline.load("backprojection", (f"grid.pixels={PIXELS}", f"preprocess.band-pass.high={BAND_MHZ}"))
+    changes = (f"preprocess.band-pass.high={BAND_MHZ}", f"reconstruct.n_iterations={STEPS}")
+    coarse = Pipeline.load("nnls", changes)
     return run(coarse.model_copy(update={"grid": _grid(pipeline)}), scan, frame)["initial_pressure"]
 
 
