@@ -16,7 +16,7 @@ def demo(
     ),
     overwrite: Overwrite = False,
 ) -> None:
-    """Simulate a scan, reconstruct it three ways and compare them with the truth in one figure. Needs no network."""
+    """Simulate scans, reconstruct one three ways and find the oxygen in another, each beside the truth. No network."""
     from oatkit.demo import run_demo
 
     start = time.perf_counter()
