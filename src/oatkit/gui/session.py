@@ -20,7 +20,6 @@ from oatkit.reading import read
 from oatkit.result import Result
 from oatkit.rules import resolve
 
-FIRST_STEPS = ("preprocess", "reconstruct")
 SLOTS = ("preprocess", "forward", "reconstruct", *STEPS)
 """The steps of a pipeline in their order."""
 

@@ -31,7 +31,7 @@ class FluenceCorrected(SpectralUnmixer):
 
     With ``absorption.calibrated_by = "spectra"``, K is found once for a scan: it is the one at which chromophores and
     light explain the pressure best, for light of the wrong strength leaves a colour that no chromophore has. This needs
-    more wavelengths than chromophores. A wrong mu_s' is then made up for by K, in its effect on so2.
+    more wavelengths than chromophores. A wrong mu_s' is then largely made up for by K, in its effect on so2.
 
     In the light, absorption is kept below mu_s', where the diffusion of light ends. A K that is too low makes the
     absorption of deep vessels run away to that limit: ``diagnostics["diverged"]`` and a note say so.
