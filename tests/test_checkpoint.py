@@ -49,3 +49,12 @@ def test_solving_passes_a_checkpoint_at_each_step():
     problem = Problem(np.eye(9), np.ones(9), (3, 3))
     with pytest.raises(Stop), at_checkpoints(stop):
         oatkit.plugin("solver", "lsqr")(weight=0.1).solve(problem)
+
+
+def test_a_reconstruction_passes_a_checkpoint_at_each_step(small_scan):
+    """A run can be stopped at any iterate, even where the signal that asked for it was swallowed on its way."""
+    import oatkit
+
+    pipeline = oatkit.Pipeline.load("lsqr", ["grid.pixels=16", "grid.field_of_view_mm=9"])
+    with pytest.raises(Stop), at_checkpoints(stop):
+        oatkit.run(pipeline, small_scan)

@@ -9,6 +9,7 @@ import numpy as np
 
 from oatkit.api import Iterate, Plugin, Problem, Solver
 from oatkit.blame import blame
+from oatkit.checkpoint import checkpoint
 from oatkit.data import Grid, Image, Scan
 from oatkit.errors import PluginError, SolverError
 from oatkit.events import StepIterate
@@ -65,6 +66,7 @@ def reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iter
         state = None
         with blame(solver):
             for state in solver.iterate(problem):
+                checkpoint()
                 yield StepIterate("reconstruct", wavelength, state)
         last.append(_checked_iterate(solver, state, problem))
         norms.append(norm(problem.data))

@@ -12,11 +12,12 @@ import signal
 from oatkit.cli import showcase, scans, results, regions, series, windows, catalogue  # noqa: F401
 
 # isort: on
-from oatkit.cli.app import Complaints, app, terminate
+from oatkit.cli.app import Complaints, app, interrupt, terminate
 
 
 def main() -> None:
     """Run the command line; asked to end, by SIGTERM or a closed terminal, it cleans up behind itself."""
+    signal.signal(signal.SIGINT, interrupt)
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), terminate)

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from oatkit.checkpoint import at_checkpoints
 from oatkit.errors import OatkitError, PluginError, ReadError, ResultError, SolverError, ValidationError
 
 app = typer.Typer(
@@ -64,13 +65,29 @@ def terminate(number: int, frame: Any) -> None:
     raise Terminated(number)
 
 
+_asked_to_stop = False
+
+
+def interrupt(number: int, frame: Any) -> None:
+    """Answer Ctrl-C, and remember it: code that is being compiled just then may swallow what is raised."""
+    global _asked_to_stop
+    _asked_to_stop = True
+    raise KeyboardInterrupt
+
+
+def _look_for_interrupt() -> None:
+    if _asked_to_stop:
+        raise KeyboardInterrupt
+
+
 def command(function: Command) -> Command:
     """Register a command whose errors become one sentence and an exit code."""
 
     @functools.wraps(function)
     def guarded(*args: Any, **kwargs: Any) -> Any:
         try:
-            return function(*args, **kwargs)
+            with at_checkpoints(_look_for_interrupt):
+                return function(*args, **kwargs)
         except OatkitError as error:
             if os.environ.get("OATKIT_DEBUG"):
                 raise
