@@ -5,7 +5,7 @@ import time
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -89,12 +89,9 @@ def motion(
     found = find_motion(read(scan))
     typer.echo(json.dumps(found.table(), indent=2, allow_nan=False) if as_json else motion_text(found))
     if figure is not None:
-        from oatkit.atomic import write_file
         from oatkit.motion.figure import motion_figure  # matplotlib
-        from oatkit.page import png
 
-        write_file(figure, png(motion_figure(found)), overwrite)
-        typer.echo(f"wrote {figure}", err=as_json)
+        _draw(motion_figure(found), figure, as_json, overwrite)
 
 
 @command
@@ -131,12 +128,9 @@ def focus(
         result = find(loaded, found, speeds_m_s=speeds, frame=frame, metric=metric, on_event=bar.show)
     typer.echo(json.dumps(result.table(), indent=2, allow_nan=False) if as_json else focus_text(result))
     if figure is not None:
-        from oatkit.atomic import write_file
         from oatkit.focus.figure import focus_figure  # matplotlib
-        from oatkit.page import png
 
-        write_file(figure, png(focus_figure(result)), overwrite)
-        typer.echo(f"wrote {figure}", err=as_json)
+        _draw(focus_figure(result), figure, as_json, overwrite)
 
 
 @command
@@ -202,3 +196,12 @@ def convert(
     typer.echo(f"wrote {file}")
     for note in notes:
         typer.echo(f"note: {note}")
+
+
+def _draw(drawn: Any, file: Path, as_json: bool, overwrite: bool) -> None:
+    """Write a figure as a PNG file, and say so where it does not mix with JSON."""
+    from oatkit.atomic import write_file
+    from oatkit.page import png
+
+    write_file(file, png(drawn), overwrite)
+    typer.echo(f"wrote {file}", err=as_json)

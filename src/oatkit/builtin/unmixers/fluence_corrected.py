@@ -80,7 +80,7 @@ class FluenceCorrected(SpectralUnmixer):
         found = by_spectra(replace(passes, calibration=None))
         if found.value is None:
             return replace(found, notes=("the spectra tell no calibration: they fit as well without any light lost",))
-        note = f"K = {found.value:.3g} a.u. m makes the spectra fit best, on the scan's first frame"
+        note = f"K = {found.value:.3g} a.u. m makes the spectra fit best"
         return replace(found, notes=(note,))
 
     def _solve(self, spectra: np.ndarray, data: np.ndarray) -> np.ndarray:
