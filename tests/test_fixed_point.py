@@ -117,3 +117,18 @@ def test_one_calibration_holds_at_all_wavelengths():
     found, _ = fixed_point(AbsorptionTable(passes=15), MODEL, optics, both, MODEL.fluence(boundary, optics), boundary)
     tubes = found.values[:, deep_tube()].mean(1)
     assert tubes[1] / tubes[0] == pytest.approx(0.5, rel=0.03)
+
+
+def test_negative_pixels_take_nothing_from_the_mean():
+    """Without K, pixels far below zero leave the light as zeros would: the mean is that of what absorbs."""
+    _, pressure, boundary, agar = star()
+    y, x = np.meshgrid(GRID.y_m, GRID.x_m, indexing="ij")
+    corner = np.hypot(y - 3e-3, x) < 1e-3
+    signed, zeroed = (
+        Image(np.where(corner, value, pressure.values), "initial_pressure", "a.u.", GRID, pressure.wavelengths_nm)
+        for value in (-100.0, 0.0)
+    )
+    light = MODEL.fluence(boundary, agar)
+    table = AbsorptionTable(passes=6)
+    lights = [fixed_point(table, MODEL, agar, image, light, boundary)[1].values for image in (signed, zeroed)]
+    assert lights[0] == pytest.approx(lights[1], rel=1e-6)

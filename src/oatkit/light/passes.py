@@ -118,22 +118,26 @@ class Passes:
         """Return |p0 - K Gamma Phi E c| / |p0| over the body and all wavelengths."""
         inside = self.model.inside
         pressure = self.pressure[:, inside]
-        shown = np.divide(state.fitted, state.absorption, where=state.absorption != 0, out=np.zeros_like(state.fitted))
+        shown = (state.calibration * self._floored(state.light) * state.fitted)[:, inside]
         size = float(np.linalg.norm(pressure))
-        return float(np.linalg.norm(pressure - pressure * shown[:, inside])) / size if size > 0 else 0.0
+        return float(np.linalg.norm(pressure - shown)) / size if size > 0 else 0.0
 
     def _light(self, absorption_per_m: np.ndarray) -> np.ndarray:
         return self.model.light(np.where(self.model.inside, absorption_per_m, 0.0), self.scattering)
 
     def _pass(self, light: np.ndarray) -> State:
         inside = self.model.inside
-        lowest = self.floor * np.where(inside, light, 0).max((1, 2), keepdims=True)
-        signal = np.where(inside, self.pressure / np.maximum(light, lowest), np.nan)
+        signal = np.where(inside, self.pressure / self._floored(light), np.nan)
         concentrations = self.fit(signal)
-        fitted = np.tensordot(self.spectra, concentrations, 1)
+        # What is negative absorbs nothing.
+        fitted = np.maximum(np.tensordot(self.spectra, concentrations, 1), 0)
         # An image of zeros has no scale.
         scale = self.calibration or float(np.mean(fitted[:, inside])) / self._stated_mean or 1.0
         return State(light, signal / scale, fitted / scale, concentrations / scale, scale)
+
+    def _floored(self, light: np.ndarray) -> np.ndarray:
+        """Return the light that is divided by."""
+        return np.maximum(light, self.floor * np.where(self.model.inside, light, 0).max((1, 2), keepdims=True))
 
     @property
     def _stated_mean(self) -> float:
