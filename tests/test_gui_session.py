@@ -95,3 +95,14 @@ def test_opening_a_scan_goes_to_its_first_frame(small_scan_file):
     session.open_scan(small_scan_file)
     assert (session.frame, session.result) == (0, None)
     assert session.scan.frames == 2
+
+
+def test_the_absorption_is_calibrated_by_an_unmixer_that_is_not_run(small_scan):
+    """Run to the absorption: its rule still asks the unmixer, whose own images are not made."""
+    session = small_session(small_scan, "multispectral")
+    session.document.set("preprocess", "high", 3.0, index=4)
+    items = finished(session.run(up_to="absorption"))
+    images = items[-1].result
+    assert "absorption" in images
+    assert "residual" not in images
+    assert any("the spectra tell no calibration" in note for note in images.warnings)

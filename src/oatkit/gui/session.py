@@ -1,7 +1,7 @@
 """What the windows show and change: a scan, a pipeline, a frame, and what came out. No Qt, no napari."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from oatkit.data import Image, Scan
 from oatkit.engine import run_resolved
 from oatkit.errors import ValidationError
-from oatkit.events import Event, StepDone, StepIterate, StepStarted
+from oatkit.events import Event, StepIterate
 from oatkit.gui.document import PipelineDocument
 from oatkit.gui.job import Job
 from oatkit.memo import Memo
@@ -82,7 +82,9 @@ class Session:
         `up_to` names the last step to run. What was computed before and has not changed is not computed again. Raises
         `ValidationError` where there is no scan.
         """
-        scan, frame, pipeline = self._scan(), self.frame, _up_to(self.pipeline, up_to)
+        scan, frame, asked = self._scan(), self.frame, _up_to(self.pipeline, up_to)
+        # The unmixer finds the calibration of the absorption, also where it is not run itself.
+        ruled = self.pipeline if asked.absorption else asked
 
         def work(job: Job) -> Iterator[Any]:
             def tell(event: Event) -> None:
@@ -94,7 +96,8 @@ class Session:
                 else:
                     job.show(event)
 
-            resolved = resolve(pipeline, scan, self.memo, tell, frame)
+            found = resolve(ruled, scan, self.memo, tell, frame)
+            resolved = replace(found, pipeline=_up_to(found.pipeline, up_to), requested=asked)
             job.check()
             result = run_resolved(resolved, scan, frame, self.memo, tell)
             job.check()
@@ -132,14 +135,3 @@ def _up_to(pipeline: Pipeline, last: str | None) -> Pipeline:
         return pipeline
     later = SLOTS[SLOTS.index(last) + 1 :]
     return pipeline.model_copy(update={slot: None for slot in later if slot in STEPS})
-
-
-def images_of(event: Event) -> dict[str, Image]:
-    """Return what a step made; nothing for other events."""
-    return dict(event.images) if isinstance(event, StepDone) else {}
-
-
-def step_of(event: Event) -> str:
-    """Return which step an event belongs to."""
-    assert isinstance(event, StepStarted | StepIterate | StepDone)
-    return event.step

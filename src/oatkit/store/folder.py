@@ -11,7 +11,7 @@ import numpy as np
 from oatkit.data import Image
 from oatkit.errors import ResultError
 from oatkit.result import Result
-from oatkit.store.manifest import FrameEntry, ImageEntry, Manifest, chunk_file, digest, read_manifest
+from oatkit.store.manifest import BY_FRAME, FrameEntry, ImageEntry, Manifest, chunk_file, digest, read_manifest
 
 LARGEST_IMAGE = 2**32
 """Bytes of one image of one frame; a folder that declares more is not read."""
@@ -89,13 +89,7 @@ class Store:
 
     def _result(self, images: Mapping[str, Image], record: FrameEntry | None, stored: "Store | None" = None) -> Result:
         manifest = self.manifest
-        common = {
-            "pipeline": manifest.pipeline,
-            "scan": manifest.scan,
-            "weight_choice": manifest.weight_choice,
-            "speed_choice": manifest.speed_choice,
-            "calibration_choice": manifest.calibration_choice,
-        }
+        own = record.own if record else {}
         return Result(
             images,
             requested=manifest.requested,
@@ -105,7 +99,7 @@ class Store:
             frame_index=record.frame_index if record else 0,
             time_s=record.time_s if record else None,
             stored=stored,
-            **{**common, **{key: own for key, own in (record.own if record else {}).items() if key in common}},
+            **{key: own.get(key, getattr(manifest, key)) for key in BY_FRAME},
         )
 
 

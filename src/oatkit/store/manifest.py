@@ -22,6 +22,8 @@ from oatkit.result import Result
 FILE_NAME = "manifest.json"
 FORMAT = "oatkit-result"
 VERSION = 1
+BY_FRAME = ("pipeline", "scan", "weight_choice", "speed_choice", "calibration_choice")
+"""What frames may have of their own, where the pipeline's ``scan.rules`` is "frame"."""
 LARGEST_MANIFEST = 2**28
 """Bytes; more is not read."""
 

@@ -17,6 +17,7 @@ from oatkit.plain import encode
 from oatkit.result import Result
 from oatkit.store.arrays import attributes, create_array
 from oatkit.store.manifest import (
+    BY_FRAME,
     FILE_NAME,
     FileEntry,
     FrameEntry,
@@ -30,8 +31,6 @@ from oatkit.store.manifest import (
 
 _COMMON = ("pipeline", "requested", "versions", "scan", "weight_choice", "speed_choice", "calibration_choice")
 """What is stored once for all frames, from the first one written."""
-_BY_FRAME = ("pipeline", "scan", "weight_choice", "speed_choice", "calibration_choice")
-"""What frames may have of their own, where the pipeline's ``scan.rules`` is "frame"."""
 
 
 class StoreWriter:
@@ -135,7 +134,7 @@ class StoreWriter:
 
     def _own(self, result: Result) -> dict[str, Any]:
         """Return what this frame does not have in common with the first one."""
-        keys = _BY_FRAME if _rules_by_frame(result) else ()
+        keys = BY_FRAME if _rules_by_frame(result) else ()
         return {key: own for key in keys if (own := encode(getattr(result, key))) != self._common[key]}
 
     def _seal(self, name: str) -> None:
