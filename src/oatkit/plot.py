@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -9,12 +10,33 @@ from oatkit.page import INK, PALE, Page
 
 COLOURS = ("#0b6fa4", "#d1495b", "#2e8b57", "#b8860b", "#6a4c93", "#5c5c5c", "#e377c2", "#17becf")
 """Distinct on white, in print and to most colour-blind eyes."""
+ON_DARK = ("#58a6ff", "#ff7b72", "#56d364", "#e3b341", "#bc8cff", "#a8b1bb", "#f778ba", "#39c5cf")
+"""The same order of colours, distinct on a dark window."""
 AXIS_LEFT, AXIS_BELOW = 150, 120
 """Dots for numbers and labels of the axes."""
 MOST_INSIDE = 4
 """A legend of more lines stands beside the axes: within them it would cover curves."""
 LEGEND_HANDLE, LEGEND_LETTER = 90, 12
 """Dots for what stands before a label of the legend, and for each of its letters."""
+
+
+@dataclass(frozen=True)
+class Style:
+    """The colours of a plot."""
+
+    ink: str
+    """Of text."""
+    pale: str
+    """Of axes and of lines that only guide the eye."""
+    colours: tuple[str, ...]
+    """Of the curves, in turn."""
+
+    def of(self, index: int) -> str:
+        """Return the colour of a curve, by its number."""
+        return self.colours[index % len(self.colours)]
+
+
+PRINT = Style(INK, PALE, COLOURS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,36 +94,43 @@ class Plot:
 def draw_plot(page: Page, plot: Plot, left: int, bottom: int, width: int, height: int) -> None:
     """Draw a plot into a box of the page, its title above the box, a long legend to the right of it."""
     axes = page.axes(left + AXIS_LEFT, bottom + AXIS_BELOW, width - AXIS_LEFT, height - AXIS_BELOW)
-    for colour, curve in zip(_cycled(len(plot.curves)), plot.curves, strict=True):
+    draw_curves(axes, plot, PRINT, beside=bool(plot.legend_width))
+    page.text(left + AXIS_LEFT, bottom + height + 14, plot.title, size=9.5, va="bottom")
+
+
+def draw_curves(axes: Any, plot: Plot, style: Style, beside: bool = False) -> None:
+    """Draw all of a plot but its title on matplotlib's axes; `beside` them or within them stands the legend."""
+    for i, curve in enumerate(plot.curves):
+        colour = style.of(i)
         axes.plot(curve.x, curve.y, curve.style, color=colour, linewidth=1, markersize=2.5, label=_literal(curve.label))
         if curve.spread is not None:
             low, high = np.subtract(curve.y, curve.spread), np.add(curve.y, curve.spread)
             axes.fill_between(curve.x, low, high, color=colour, alpha=0.15, linewidth=0)
-    for colour, mark in zip(_cycled(len(plot.marks)), plot.marks, strict=True):
-        axes.plot([mark.x], [mark.y], "D", color=colour, markersize=4.5, fillstyle="none", label=_literal(mark.label))
+    for i, mark in enumerate(plot.marks):
+        look = {"color": style.of(i), "markersize": 4.5, "fillstyle": "none"}
+        axes.plot([mark.x], [mark.y], "D", label=_literal(mark.label), **look)
     for x, label in plot.verticals:
-        axes.axvline(x, color=PALE, linewidth=0.8, linestyle=":", label=_literal(label))
+        axes.axvline(x, color=style.pale, linewidth=0.8, linestyle=":", label=_literal(label))
+    _draw_axes(axes, plot, style)
+    if plot.labels:
+        where = {"loc": "upper left", "bbox_to_anchor": (1, 1)} if beside else {}
+        axes.legend(fontsize=6.5, frameon=False, labelcolor=style.ink, **where)
+
+
+def _draw_axes(axes: Any, plot: Plot, style: Style) -> None:
     if "x" in plot.logarithmic:
         axes.set_xscale("log")
     if "y" in plot.logarithmic:
         axes.set_yscale("log")
     if plot.names:
         axes.set_xticks(range(len(plot.names)), plot.names)
-    axes.set_xlabel(plot.x_label, size=8, color=INK)
-    axes.set_ylabel(plot.y_label, size=8, color=INK)
-    axes.tick_params(labelsize=7.5, length=2, width=0.5, colors=INK, which="both")
+    axes.set_xlabel(plot.x_label, size=8, color=style.ink)
+    axes.set_ylabel(plot.y_label, size=8, color=style.ink)
+    axes.tick_params(labelsize=7.5, length=2, width=0.5, colors=style.ink, which="both")
     for spine in axes.spines.values():
-        spine.set(linewidth=0.5, color=PALE)
-    if plot.labels:
-        beside = {"loc": "upper left", "bbox_to_anchor": (1, 1)} if plot.legend_width else {}
-        axes.legend(fontsize=6.5, frameon=False, **beside)
-    page.text(left + AXIS_LEFT, bottom + height + 14, plot.title, size=9.5, va="bottom")
+        spine.set(linewidth=0.5, color=style.pale)
 
 
 def _literal(label: str) -> str:
     """Return a label, which may hold a name from a file, as matplotlib shows it: no formula, and never kept back."""
     return label.replace("$", r"\$").lstrip("_")
-
-
-def _cycled(count: int) -> list[str]:
-    return [COLOURS[i % len(COLOURS)] for i in range(count)]
