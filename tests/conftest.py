@@ -17,6 +17,8 @@ WINDOWS = {"qapp", "qtbot", "make_napari_viewer", "make_napari_viewer_proxy"}
 NO_DISPLAY = """needs a display, or Xvfb; on Debian: apt-get install xvfb libfontconfig1 libgl1 libegl1 libglib2.0-0 \
 libdbus-1-3 libxkbcommon0 libxkbcommon-x11-0 libxcb-cursor0 libxcb-icccm4 libxcb-keysyms1 libxcb-shape0"""
 
+# Nobody's own preferences, and none are written.
+os.environ["NAPARI_CONFIG"] = ""
 # Before anything imports Qt, which without a display would abort the whole run. pytest-xvfb starts Xvfb by itself.
 NO_WINDOWS = os.environ.get("OATKIT_NO_WINDOWS") or not shutil.which("Xvfb")
 if sys.platform.startswith("linux") and NO_WINDOWS and not any(os.environ.get(d) for d in DISPLAYS):

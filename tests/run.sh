@@ -25,9 +25,9 @@ packages="xvfb libfontconfig1 libgl1 libegl1 libglib2.0-0 libdbus-1-3 libxkbcomm
 libxcb-icccm4 libxcb-keysyms1 libxcb-shape0"
 if command -v dpkg >/dev/null && ! dpkg -s $packages >/dev/null 2>&1; then
     if ! { [ "$(id -u)" = 0 ] && apt-get update -qq && apt-get install -y -qq --no-install-recommends $packages; }; then
-        echo "Tests of the window are SKIPPED: Debian packages are missing that could not be installed here." >&2
+        echo "Tests of the window cannot run: Debian packages are missing that could not be installed here." >&2
         echo "They need: apt-get install" $packages >&2
-        export OATKIT_NO_WINDOWS=1
+        [ -n "${CI:-}" ] || export OATKIT_NO_WINDOWS=1 # skipped; with CI they fail
     fi
 fi
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -e '.[test]'

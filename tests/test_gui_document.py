@@ -84,3 +84,19 @@ def test_a_part_of_a_plugin_is_set_within_it():
     document = PipelineDocument.of_preset("l1")
     document.set("reconstruct", "basis", "pixel", part="regularizer")
     assert document.pipeline.reconstruct.regularizer.basis == "pixel"
+
+
+def test_saved_elsewhere_a_pipeline_names_the_same_files(tmp_path):
+    """In its own folder the bytes stay; in another one a relative path is written whole, and nothing else changes."""
+    (tmp_path / "here").mkdir()
+    (tmp_path / "there").mkdir()
+    text = presets()["maxent"] + '\n[segment] # by hand\nuse = "mask"\npath = "masks/body.png"\n'
+    own = tmp_path / "here" / "mine.toml"
+    own.write_text(text)
+    document = PipelineDocument.open(own)
+    document.save(own)
+    assert own.read_text() == text
+    moved = tmp_path / "there" / "mine.toml"
+    document.save(moved)
+    assert moved.read_text() == text.replace("masks/body.png", str(tmp_path / "here" / "masks" / "body.png"))
+    assert PipelineDocument.open(moved).pipeline == PipelineDocument.open(own).pipeline

@@ -3,19 +3,23 @@
 import os
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import oatkit
 from gui_viewers import PluginManager, PluginManifest, bench_without_window, disc_boundary, pressure, wait_for
+from oatkit.cli.windows import BINDINGS
 from oatkit.errors import ReadError, ValidationError
 from oatkit.gui import contributions, opening, window
 from oatkit.gui.layers import KEY
 from oatkit.gui.samples import SAMPLES
+from oatkit.gui.settings import Settings
 from oatkit.gui.workbench import workbench
-from oatkit.pipeline import preset
+from oatkit.pipeline import preset, presets
 from oatkit.result import Result
 from results import write_frames
 
@@ -44,6 +48,18 @@ def test_the_installed_package_tells_napari_of_the_manifest():
     """The entry point leads npe2 to the same manifest."""
     installed = PluginManifest.from_distribution("oatkit")
     assert installed.contributions == PluginManifest.from_file(MANIFEST).contributions
+
+
+def test_the_preferences_offer_what_the_windows_read(monkeypatch):
+    """Each setting of the manifest has a field of the same default, the presets are all, and a choice counts."""
+    offered = PluginManifest.from_file(MANIFEST).contributions.configurations["windows"].properties
+    assert {key: setting.default for key, setting in offered.items()} == asdict(Settings())
+    assert offered["pipeline"].enum == list(presets())
+    chosen = SimpleNamespace(windows=SimpleNamespace(pipeline="l1", memory_mb=32, live_preview=False))
+    monkeypatch.setattr("napari.settings.get_plugin_settings", lambda name: chosen)
+    bench = bench_without_window()
+    assert bench.session.document.text == preset("l1")
+    assert (bench.session.memo.limit_bytes, bench.live_preview) == (32_000_000, False)
 
 
 def test_only_our_files_are_claimed(small_scan_file, result_folder, tmp_path):
@@ -177,11 +193,12 @@ def oatkit_gui(code: str, **environment: str) -> subprocess.CompletedProcess:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("missing", ["napari", "qtpy.QtWidgets"])
-def test_without_napari_or_qt_the_command_says_how_to_get_them(missing):
-    """`oatkit gui` exits with 2 and one sentence that holds the pip line."""
-    done = oatkit_gui(f"import sys; sys.modules[{missing!r}] = None", QT_QPA_PLATFORM="offscreen")
+@pytest.mark.parametrize(("modules", "words"), [(("napari",), "napari"), (BINDINGS, "a Qt binding")])
+def test_without_napari_or_qt_the_command_says_how_to_get_them(modules, words):
+    """`oatkit gui` exits with 2 and one sentence that holds the pip line, with a display or without."""
+    done = oatkit_gui(f"import sys; sys.modules.update(dict.fromkeys({modules!r}))")
     assert done.returncode == 2
+    assert f"needs {words}, not installed" in done.stderr
     assert 'pip install "oatkit[all]"' in done.stderr
     assert len(done.stderr.splitlines()) == 1
 

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,8 @@ from oatkit.cli.app import command
 from oatkit.errors import ValidationError
 
 INSTALL = 'pip install "oatkit[all]"'
+BINDINGS = ("PyQt6", "PySide6", "PyQt5", "PySide2")
+"""That qtpy takes, any of them."""
 
 
 @command
@@ -21,15 +24,25 @@ def gui(
     ] = None,
 ) -> None:
     """Open napari with the windows of oatkit, and a file in it."""
+    _check_installed()
     _check_display()
     try:
         import napari  # noqa: F401
         import qtpy.QtWidgets  # noqa: F401
-    except (ImportError, RuntimeError) as error:  # qtpy raises RuntimeErrors where there is no Qt binding
-        raise ValidationError(f"the window needs napari and a Qt binding: {INSTALL} ({_short(error)})") from None
+    except (ImportError, RuntimeError) as error:  # a library that Qt takes from the system is missing
+        raise ValidationError(f"napari and Qt are installed but cannot be started: {_short(error)}") from None
     from oatkit.gui.window import open_window
 
     open_window(file)
+
+
+def _check_installed() -> None:
+    """Refuse where napari or every Qt binding is missing, without importing what is there."""
+    missing = [] if find_spec("napari") else ["napari"]
+    if not any(find_spec(binding) for binding in BINDINGS):
+        missing.append("a Qt binding")
+    if missing:
+        raise ValidationError(f"the window needs {' and '.join(missing)}, not installed here: {INSTALL}")
 
 
 def _check_display() -> None:

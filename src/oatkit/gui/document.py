@@ -1,11 +1,12 @@
 """A pipeline as the text that its author wrote: edited without losing comments, with undo and redo."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import tomlkit
+from pydantic import BaseModel
 from tomlkit.exceptions import TOMLKitError
 
 from oatkit.errors import ValidationError
@@ -53,10 +54,13 @@ class PipelineDocument:
         return self.text != self._saved
 
     def save(self, path: Path) -> None:
-        """Write the text, byte for byte as it stands. Raises `ResultError` where it cannot be written."""
+        """Write the text, byte for byte as it stands; in another folder, with its relative paths made whole.
+
+        Raises `ResultError` where it cannot be written.
+        """
         from oatkit.atomic import write_file
 
-        write_file(path, self.text.encode(), overwrite=True)
+        write_file(path, self._text_in(path.parent).encode(), overwrite=True)
         self._saved, self.path = self.text, path
 
     def set(self, slot: str, key: str, value: Any, part: str = "", index: int | None = None) -> None:
@@ -132,6 +136,14 @@ class PipelineDocument:
         """Make an edit again that was taken back, if there is one."""
         self._go(self._at + 1)
 
+    def _text_in(self, folder: Path) -> str:
+        """Return the text for a file in another folder: what it names there is what it names here."""
+        if folder.resolve() == self.folder.resolve() or not (known := set(_paths(self.pipeline))):
+            return self.text
+        document = self._document()
+        _make_whole(document, self.folder, known)
+        return tomlkit.dumps(document)
+
     def _go(self, at: int) -> None:
         if 0 <= at < len(self._texts):
             self._at = at
@@ -165,6 +177,26 @@ def _nested(table: Any, part: str) -> Any:
     if not isinstance(table.get(part), Mapping):
         table[part] = tomlkit.inline_table()
     return table[part]
+
+
+def _paths(value: Any) -> Iterator[Path]:
+    """Yield the paths among the parameters of a pipeline."""
+    if isinstance(value, BaseModel):
+        value = tuple(getattr(value, name) for name in type(value).model_fields)
+    if isinstance(value, tuple | list):
+        for item in value:
+            yield from _paths(item)
+    elif isinstance(value, Path):
+        yield value
+
+
+def _make_whole(table: Any, folder: Path, known: set[Path]) -> None:
+    """Replace each text of a table that stands for one of the `known` paths by the whole path."""
+    for key, value in table.items() if isinstance(table, Mapping) else enumerate(table):
+        if isinstance(value, str) and folder / value in known:
+            table[key] = str((folder / value).absolute())
+        elif isinstance(value, Mapping | list):
+            _make_whole(value, folder, known)
 
 
 def _spaced(text: str) -> str:

@@ -4,9 +4,12 @@ from typing import Any
 
 from psygnal import Signal
 
+from oatkit.gui.document import PipelineDocument
 from oatkit.gui.layers import Layers
 from oatkit.gui.session import Session
+from oatkit.gui.settings import MB, Settings
 from oatkit.gui.viewing import Viewing
+from oatkit.memo import Memo
 
 
 class Workbench:
@@ -21,7 +24,9 @@ class Workbench:
 
     def __init__(self, viewer: Any) -> None:
         self.viewer = viewer
-        self.session = Session()
+        settings = Settings.read()
+        self.session = Session(PipelineDocument.of_preset(settings.pipeline), memo=Memo(settings.memory_mb * MB))
+        self.live_preview = settings.live_preview
         self.layers = Layers(viewer)
         self.viewing = Viewing(viewer, self.layers)
 
