@@ -1,16 +1,18 @@
 """What is put into a viewer: at the right place, in colours that do not lie, and no more read than is looked at."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from gui_viewers import GRID, WAVELENGTHS_NM, bench_without_window, disc_boundary, pressure
 from oatkit import Image
-from oatkit.gui.caption import caption
-from oatkit.gui.layers import KEY
-from oatkit.gui.looks import CHANGE, CONCENTRATION, FRACTION, INTENSITY, LIGHT, Limits, colours_of
-from oatkit.gui.stored_planes import StoredPlanes
+from oatkit.gui.images.caption import caption
+from oatkit.gui.images.layers import KEY
+from oatkit.gui.images.looks import CHANGE, CONCENTRATION, FRACTION, INTENSITY, LIGHT, Limits, colours_of
+from oatkit.gui.images.stored_planes import StoredPlanes
+from oatkit.gui.images.world import from_world, outlines, thinned, to_world
 from oatkit.gui.workbench import workbench
-from oatkit.gui.world import from_world, outlines, to_world
 from oatkit.memo import Memo
 from oatkit.polygons import area
 from oatkit.result import Result
@@ -191,6 +193,21 @@ def test_an_image_takes_the_place_of_the_one_before(bench):
     assert len(bench.viewer.layers) == 1
     bench.layers.show(image(np.ones(30)), "initial_pressure")
     assert [shown.quantity for _, _, shown in bench.layers.shown()] == ["initial_pressure"]
+
+
+def test_a_thinned_curve_stays_within_the_tolerance():
+    """No point of a curve is further from the thinned one than the tolerance, as with that of scikit-image."""
+    from skimage.measure import approximate_polygon
+
+    angle = np.linspace(0, 2 * np.pi, 400)
+    curve = np.column_stack([(5 + np.cos(5 * angle)) * np.sin(angle), 7 * np.cos(angle)])
+    curve[-1] = curve[0]
+    for tolerance in (0.02, 0.1, 0.5):
+        line = thinned(curve, tolerance)
+        between = np.concatenate([np.linspace(a, b, 2000) for a, b in itertools.pairwise(line)])
+        off = [np.hypot(*(between - point).T).min() for point in curve]
+        assert max(off) <= tolerance + 5e-3  # points on the line lie that close to one another
+        assert np.array_equal(line, approximate_polygon(curve, tolerance))
 
 
 def test_the_outline_goes_around_the_body(bench):

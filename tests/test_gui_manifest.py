@@ -15,12 +15,13 @@ from gui_viewers import PluginManager, PluginManifest, bench_without_window, dis
 from oatkit.cli.windows import BINDINGS
 from oatkit.errors import ReadError, ValidationError
 from oatkit.gui import contributions, opening, window
-from oatkit.gui.layers import KEY
+from oatkit.gui.images.layers import KEY
 from oatkit.gui.samples import SAMPLES
 from oatkit.gui.settings import Settings
 from oatkit.gui.workbench import workbench
 from oatkit.pipeline import preset, presets
 from oatkit.result import Result
+from oatkit.simulate import disc
 from results import write_frames
 
 MANIFEST = Path(oatkit.__file__).parent / "napari.yaml"
@@ -84,17 +85,15 @@ def test_a_result_is_read_without_a_window(result_folder):
 
 
 def test_a_scan_gives_a_picture_without_a_window(small_scan_file):
-    """A scan becomes the session's, and its picture is a coarse one without negative pixels, as the engine gives it."""
+    """A scan becomes the session's, and its picture shows what is in it, coarsely and without negative pixels."""
     bench = bench_without_window()
     bench.session.document.set("grid", "field_of_view_mm", 9.0)
     opening.open_path(bench, small_scan_file)
     assert bench.session.scan.frames == 2
     ((layer, key, image),) = bench.layers.shown()
-    changes = ("grid.pixels=100", "grid.field_of_view_mm=9", "preprocess.band-pass.high=2.5")
-    pipeline = oatkit.Pipeline.load("nnls", (*changes, "reconstruct.n_iterations=12"))
-    expected = oatkit.run(pipeline, oatkit.read(small_scan_file))
     assert (image.values >= 0).all()
-    assert np.array_equal(image.values, expected["initial_pressure"].values)
+    truth = disc(image.grid, radius_m=3e-3)
+    assert np.corrcoef(image.values.ravel(), truth.values.ravel())[0, 1] > 0.9
     assert (key, layer.name) == ("scan", f"scan {bench.session.scan.name}")
 
 

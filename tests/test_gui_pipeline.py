@@ -15,9 +15,9 @@ from qtpy.QtWidgets import QApplication, QToolButton
 import oatkit
 from gui_sessions import SMALL
 from oatkit.errors import SolverError
-from oatkit.gui.batch_widget import BatchWidget
-from oatkit.gui.pipeline_widget import ITERATE, PipelineWidget
-from oatkit.gui.recipe_dialog import RecipeDialog
+from oatkit.gui.batch.widget import BatchWidget
+from oatkit.gui.pipeline.recipe_dialog import RecipeDialog
+from oatkit.gui.pipeline.widget import ITERATE, PipelineWidget
 from oatkit.pipeline import presets
 
 

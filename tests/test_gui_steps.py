@@ -9,15 +9,15 @@ import oatkit
 from gui_sessions import SMALL, small_session
 from oatkit.api import KINDS, Solver
 from oatkit.errors import ValidationError
-from oatkit.gui.choices import choices
 from oatkit.gui.document import PipelineDocument
-from oatkit.gui.fields import Sort, parsed, sort_of, stepped, written
-from oatkit.gui.ledger import Ledger
-from oatkit.gui.recipe import recipe_toml
-from oatkit.gui.run_log import RunLog
-from oatkit.gui.script import script_of
+from oatkit.gui.parts.choices import choices
+from oatkit.gui.parts.fields import Sort, parsed, sort_of, stepped, written
+from oatkit.gui.pipeline.ledger import Ledger
+from oatkit.gui.pipeline.recipe import recipe_toml
+from oatkit.gui.pipeline.run_log import RunLog
+from oatkit.gui.pipeline.script import script_of
+from oatkit.gui.pipeline.slots import places
 from oatkit.gui.session import Session
-from oatkit.gui.slots import places
 from oatkit.pipeline import presets
 from oatkit.registry import installed
 

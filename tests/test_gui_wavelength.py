@@ -1,7 +1,7 @@
 """The control of wavelength: nm on one side, the slider on the other."""
 
 from gui_viewers import WAVELENGTHS_NM, bench_without_window, pressure
-from oatkit.gui.wavelength_widget import WavelengthWidget
+from oatkit.gui.view.wavelength import WavelengthWidget
 
 
 def test_control_and_slider_move_each_other(qtbot):

@@ -25,7 +25,7 @@ ORDER = [
     {"api"},
     {"blame", "events", "hookspecs", "simulate"},
     {"registry", "weights"},
-    {"pipeline", "reading"},
+    {"pipeline", "reading", "scaffold", "testing", "trial"},
     {"provenance", "result"},
     {"memo", "sheet"},
     {"figure", "kinetics", "motion", "reconstruction", "regions"},

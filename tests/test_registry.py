@@ -1,5 +1,6 @@
 """Plugins come in through entry points; a broken one costs nobody else anything."""
 
+import inspect
 import json
 import os
 import subprocess
@@ -11,6 +12,7 @@ from oatkit import ValidationError, plugin
 from oatkit.api import KINDS
 from oatkit.registry import installed
 from packages import install, run_oatkit
+from toy_plugins import Landweber
 
 GOOD = '''
 from oatkit.api import Iterate, Solver, hookimpl, param
@@ -31,6 +33,18 @@ class Landweber(Solver):
 def oatkit_solvers():
     return [Landweber]
 '''
+
+RIGHT = f"""
+from typing import ClassVar
+import numpy as np
+from oatkit.api import Iterate, Solver, hookimpl, param
+
+{inspect.getsource(Landweber)}
+
+@hookimpl
+def oatkit_solvers():
+    return [Landweber]
+"""
 
 RUDE = """
 from oatkit.api import Reader, hookimpl
@@ -63,6 +77,16 @@ BROKEN = {
         "lacks the method iterate",
     ),
     "needs-arguments": (GOOD.format(name="needy").replace("param(5,", "param(...,"), "is missing"),
+    "system-exit-in-hook": (
+        "import sys\nfrom oatkit.api import hookimpl\n@hookimpl\ndef oatkit_solvers(): sys.exit(3)",
+        "SystemExit",
+    ),
+    "newer-api": (
+        "OATKIT_API = (2, 0)\n" + GOOD.format(name="newer"),
+        "made for version 2.0 of the plugin API, this oatkit has 1.0: update oatkit",
+    ),
+    "older-api": ("OATKIT_API = (0, 9)", "made for version 0.9 of the plugin API, this oatkit has 1.0: update the"),
+    "odd-api": ("OATKIT_API = '1.0'", "expected two whole numbers, as in (1, 0)"),
     "bad-name": (GOOD.format(name="Not A Name"), "no plugin name"),
 }
 
@@ -71,7 +95,7 @@ BROKEN = {
 def packages(tmp_path_factory):
     """A folder with a good package, two that share a name, one that takes a built-in's, and broken ones."""
     target = tmp_path_factory.mktemp("site") / "packages"
-    install(target, "oatkit-good", GOOD.format(name="landweber"), "2.5")
+    install(target, "oatkit-good", "OATKIT_API = (1, 0)\n" + GOOD.format(name="landweber"), "2.5")
     install(target, "oatkit-first", GOOD.format(name="twin"))
     install(target, "oatkit-second", GOOD.format(name="twin"))
     install(target, "oatkit-shadow", GOOD.format(name="lsqr"))
@@ -180,3 +204,54 @@ def test_a_plugin_is_found_by_kind_and_name():
         plugin("solver", "maxent_nlcg")
     with pytest.raises(ValidationError, match="did you mean 'solver'"):
         plugin("solvers", "lsqr")
+
+
+@pytest.mark.parametrize("chosen", ["none", "oatkit-good", " OATKIT_Good ,oatkit-second"])
+def test_the_environment_says_whose_plugins_are_loaded(packages, chosen, monkeypatch):
+    """With OATKIT_PLUGINS only ours and those of the named distributions are there, and the others are not imported."""
+    monkeypatch.setenv("OATKIT_PLUGINS", chosen)
+    done = run_oatkit("plugins", path=packages)
+    named = {name.strip().lower().replace("_", "-") for name in chosen.split(",")} - {"none"}
+    lines, last = done.stdout.splitlines()[:-1], done.stdout.splitlines()[-1]
+    assert {line.split()[2] for line in lines} == {"oatkit"} | named
+    assert last.startswith("left out by OATKIT_PLUGINS: ")
+    assert ("oatkit-good" in last) == ("oatkit-good" not in named)
+
+
+VIOLENT = {
+    "oatkit-crash": ("import os, sys\nprint('bang', file=sys.stderr, flush=True)\nos.abort()", "killed by SIGABRT"),
+    "oatkit-exit": ("import os\nos._exit(7)", "exit code 7"),
+    "oatkit-hang": ("import time\ntime.sleep(600)", "stopped after 3 s"),
+}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs signals")
+def test_plugins_that_crash_or_hang_are_found_from_outside(packages, tmp_path, monkeypatch):
+    """`plugins --check` names what a distribution does to a process, in the time that it is given; right ones are ok.
+
+    It names the promises that a plugin breaks.
+    With OATKIT_PLUGINS=none the program works beside them.
+    """
+    site = tmp_path / "packages"
+    install(site, "oatkit-good", GOOD.format(name="landweber"), "2.5")
+    for name, (module, _) in VIOLENT.items():
+        install(site, name, module)
+    done = run_oatkit("plugins", "--check", "all", "--seconds", "3", path=site)
+    assert done.returncode == 2
+    assert done.stderr == "oatkit: not all plugins can be used: oatkit-crash, oatkit-exit, oatkit-hang\n"
+    for name, (_, words) in VIOLENT.items():
+        (line,) = [line for line in done.stdout.splitlines() if name in line]
+        assert words in line
+    assert "bang" in done.stdout
+    install(site, "oatkit-right", RIGHT)
+    done = run_oatkit("plugins", "--check", "oatkit-right", path=site)
+    assert (done.returncode, done.stdout) == (0, "solver         toy-landweber    oatkit-right 1.0\n")
+    done = run_oatkit("plugins", "--check", "oatkit-good", path=site)
+    first, *broken = done.stdout.splitlines()
+    assert (done.returncode, first) == (2, "solver         landweber        oatkit-good 2.5")
+    assert {"docstring", "known_answers", "honest", "products"} <= {line.split(":")[0].strip() for line in broken}
+    assert done.stderr == "oatkit: not all plugins keep their promises: oatkit-good\n"
+    done = run_oatkit("plugins", "--check", "oatkit-god", path=site)
+    assert "did you mean 'oatkit-good'?" in done.stderr
+    monkeypatch.setenv("OATKIT_PLUGINS", "none")
+    assert run_oatkit("plugins", path=site).returncode == 0

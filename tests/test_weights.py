@@ -8,7 +8,11 @@ import pytest
 import oatkit
 from oatkit import weights
 from oatkit.api import Detectors, Geometry, Problem
-from oatkit.errors import ValidationError
+from oatkit.checkpoint import at_checkpoints
+from oatkit.errors import PluginError, ValidationError
+from oatkit.events import StepStarted
+from oatkit.memo import Memo
+from oatkit.progress import ProgressBar
 from oatkit.weights import CANDIDATES, choose, l_curve_chord, l_curve_corner, resolve
 from small_problems import blurred, circles, dense
 
@@ -189,3 +193,112 @@ def test_table_of_a_choice_is_plain():
     assert table["rule"] == "l-curve"
     assert len(table["curve"]) == len(CANDIDATES)
     assert table["disagreement"] == max(table["picks"].values()) / min(table["picks"].values())
+
+
+def lsqr(**fields):
+    """Least squares with a rule for its weight."""
+    return oatkit.plugin("solver", "lsqr")(**{"weight": "l-curve", **fields})
+
+
+@pytest.mark.parametrize("rule", ["l-curve", "hold-out"])
+def test_who_listens_sees_each_point_and_changes_nothing(rule):
+    """Listeners are told how many of 13 are done, and shown each point with its image; the choice stays the same."""
+    problem, told, shown = with_geometry(circles()), [], []
+    solver = lsqr(weight=rule)
+    heard = resolve(solver, problem, told.append, lambda point, last: shown.append((point, last)))
+    assert told == [StepStarted(f"choosing the weight, {done} of 13 done") for done in range(13)]
+    assert heard == resolve(solver, problem)
+    assert tuple(point for point, _ in shown) == heard[1].curve
+    for point, last in shown:
+        assert (last.residual_norm, last.penalty) == (point.residual_norm, point.penalty)
+    if rule == "l-curve":
+        alone = lsqr(weight=shown[4][0].weight).solve(with_geometry(circles()))
+        assert (shown[4][1].image == alone.image).all()
+
+
+def test_choosing_passes_a_checkpoint_at_each_step_of_the_solver():
+    """A choice can be stopped in the middle of any candidate, not only between two."""
+
+    class Stop(BaseException):
+        pass
+
+    def stop_at_the_third():
+        passed.append(True)
+        if len(passed) == 3:
+            raise Stop
+
+    passed, shown = [], []
+    with pytest.raises(Stop), at_checkpoints(stop_at_the_third):
+        choose(lsqr(), circles(), "l-curve", on_point=lambda point, last: shown.append(point))
+    assert shown == []
+
+
+def test_a_failing_solver_is_named_and_a_failing_listener_is_not_its_fault():
+    """What a solver raises becomes a `PluginError` with its name; what a listener raises passes as it is."""
+
+    class Broken(oatkit.plugin("solver", "lsqr")):
+        def descend(self, problem, weight):
+            raise RuntimeError("out of luck")
+
+    with pytest.raises(PluginError, match="solver 'lsqr' failed: RuntimeError: out of luck"):
+        choose(Broken(), circles(), "l-curve")
+
+    def deaf(event):
+        raise BrokenPipeError("nobody reads")
+
+    with pytest.raises(BrokenPipeError, match="nobody reads"):
+        choose(lsqr(), circles(), "l-curve", on_event=deaf)
+
+
+def test_zero_data_are_refused():
+    """Where the data are zero no rule can choose."""
+    zero = replace(circles(), data=np.zeros_like(circles().data))
+    with pytest.raises(ValidationError, match="the data are zero"):
+        choose(lsqr(), zero, "l-curve")
+
+
+SMALL = ("grid.pixels=16", "grid.field_of_view_mm=9", "reconstruct.weight=l-curve", "reconstruct.n_iterations=12")
+
+
+def choices_told(pipeline, scan, memo):
+    """How many candidates a run has tried, and its result."""
+    told = []
+    result = oatkit.run(pipeline, scan, memo=memo, on_event=told.append)
+    return sum(isinstance(e, StepStarted) and e.step.endswith("of 13 done") for e in told), result
+
+
+def test_a_choice_is_made_once_for_what_it_depends_on(small_scan):
+    """A second run with the same memo tries no weight and gives the same; another solver or scan is tried anew."""
+    memo, pipeline = Memo(), oatkit.Pipeline.load("lsqr", SMALL)
+    tried, first = choices_told(pipeline, small_scan, memo)
+    assert tried == 13
+    tried, second = choices_told(pipeline, small_scan, memo)
+    assert tried == 0
+    assert second == first
+    assert second.weight_choice == first.weight_choice == oatkit.run(pipeline, small_scan).weight_choice
+    for change in ("reconstruct.n_iterations=11", "reconstruct.weight=hold-out", "grid.pixels=17"):
+        assert choices_told(oatkit.Pipeline.load("lsqr", (*SMALL, change)), small_scan, memo)[0] == 13
+    louder = replace(small_scan, signals=2 * np.asarray(small_scan.signals))
+    assert choices_told(pipeline, louder, memo)[0] == 13
+
+
+def test_a_terminal_sees_how_many_weights_are_done(small_scan, monkeypatch):
+    """The progress line of a run by rule counts the candidates."""
+
+    class Terminal:
+        text = ""
+
+        def isatty(self):
+            return True
+
+        def write(self, text):
+            self.text += text
+
+        def flush(self): ...
+
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    with ProgressBar() as bar:
+        oatkit.run(oatkit.Pipeline.load("lsqr", SMALL), small_scan, on_event=bar.show)
+    assert "choosing the weight, 0 of 13 done" in terminal.text
+    assert "choosing the weight, 12 of 13 done" in terminal.text

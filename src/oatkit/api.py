@@ -23,14 +23,20 @@ from oatkit.scale import Reference
 from oatkit.shapes import EllipseRegion, PolygonRegion, RectangleRegion, Region
 
 __all__ = [
-    "KINDS", "Calibration", "Detectors", "EllipseRegion", "FluenceModel", "ForwardModel", "Geometry", "Grid", "Image",
-    "Iterate", "OatkitError", "Optics", "Plugin", "PluginError", "PolygonRegion", "Preprocessor", "Problem",
-    "Proximable", "Quadratic", "ReadError", "Reader", "RectangleRegion", "Reference", "Region", "Regularizer", "Scan",
-    "Segmenter", "Signals", "Smooth", "Solver", "SolverError", "UnmixProblem", "Unmixer", "ValidationError", "Weight",
-    "hookimpl", "param",
+    "API_VERSION", "KINDS", "Calibration", "Detectors", "EllipseRegion", "FluenceModel", "ForwardModel", "Geometry",
+    "Grid", "Image", "Iterate", "OatkitError", "Optics", "Plugin", "PluginError", "PolygonRegion", "Preprocessor",
+    "Problem", "Proximable", "Quadratic", "ReadError", "Reader", "RectangleRegion", "Reference", "Region",
+    "Regularizer", "Scan", "Segmenter", "Signals", "Smooth", "Solver", "SolverError", "UnmixProblem", "Unmixer",
+    "ValidationError", "Weight", "hookimpl", "param",
 ]  # fmt: skip
 
 hookimpl = pluggy.HookimplMarker("oatkit")
+
+API_VERSION = (1, 0)
+"""Of all in this module. The second number rises when something is added, the first when something is taken away.
+
+A package that says what it was made for, ``OATKIT_API = (1, 0)`` in the module that its entry point names, is refused
+with a sentence by an oatkit that does not have it."""
 
 Weight = float | Literal["l-curve", "hold-out"]
 """Type of a solver's weight: a number above 0, or the rule of `oatkit.weights` that chooses it."""

@@ -7,7 +7,7 @@ nothing under the final name.
 import os
 import secrets
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -80,23 +80,27 @@ def new_file(path: Path, overwrite: bool = False) -> Iterator[Path]:
 
 
 @contextmanager
-def new_folder(path: Path, overwrite: bool = False) -> Iterator[Path]:
+def new_folder(
+    path: Path, overwrite: bool = False, hidden: Path | None = None, worth_keeping: Callable[[], bool] = lambda: False
+) -> Iterator[Path]:
     """Yield a hidden folder beside `path` that takes this name when the block ends well, and vanishes otherwise.
 
-    A folder that stands there is replaced if `overwrite`, at the last moment. Files must be synced by who writes them.
-    Raises `ResultError`.
+    One that is given by its name, `hidden`, may be there already, and stays after an exception where it is
+    `worth_keeping`. A folder that stands at `path` is replaced if `overwrite`, at the last moment. Files must be synced
+    by who writes them. Raises `ResultError`.
     """
     path = Path(path).absolute()
-    hidden = _hidden(path)
+    made = hidden or _hidden(path)
     try:
-        hidden.mkdir()
+        made.mkdir(exist_ok=hidden is not None)
     except OSError as error:
         raise ResultError(f"{path}: could not be written: {error.strerror or error}") from error
     try:
-        yield hidden
-        _put_in_place(hidden, path, overwrite)
+        yield made
+        _put_in_place(made, path, overwrite)
     finally:
-        shutil.rmtree(hidden, ignore_errors=True)
+        if not worth_keeping():
+            shutil.rmtree(made, ignore_errors=True)
 
 
 def _hidden(path: Path) -> Path:

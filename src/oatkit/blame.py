@@ -14,6 +14,6 @@ def blame(plugin: Parameters) -> Iterator[None]:
         yield
     except OatkitError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         kind = plugin.kind.replace("_", " ")
         raise PluginError(f"{kind} '{plugin.name}' failed: {type(error).__name__}: {error}") from error

@@ -33,6 +33,7 @@ def run_resolved(resolved: Resolved, scan: Scan, frame: int, memo: Memo, on_even
     """Run a pipeline whose rules `oatkit.rules.resolve` has replaced."""
     images: dict[str, Image] = {}
     seconds: dict[str, float] = {}
+    choices = resolved.choices
     notes = [*scan.notes, *resolved.notes, *resolved.notes_on(frame)]
     for event in steps(resolved.pipeline, scan, frame, memo):
         on_event(event)
@@ -50,9 +51,9 @@ def run_resolved(resolved: Resolved, scan: Scan, frame: int, memo: Memo, on_even
         warnings=tuple(dict.fromkeys(notes)),
         frame_index=frame,
         time_s=_time_of(scan, frame),
-        weight_choice=resolved.weight.table() if resolved.weight else {},
-        speed_choice=resolved.speed.table() if resolved.speed else {},
-        calibration_choice=resolved.calibration.table() if resolved.calibration else {},
+        weight_choice=choices["weight_choice"],
+        speed_choice=choices["speed_choice"],
+        calibration_choice=choices["calibration_choice"],
     )
 
 
@@ -83,6 +84,6 @@ def _time_of(scan: Scan, frame: int) -> float | None:
 
 def _origin(scan: Scan, resolved: Resolved) -> str:
     """Say where a speed of sound that is not the scan's own comes from."""
-    if resolved.speed is None:
+    if not resolved.choices["speed_choice"]:
         return "pipeline"
     return f"focus; the file's is {scan.geometry.speed_of_sound_m_s:.1f} m/s, {scan.speed_of_sound_source}"

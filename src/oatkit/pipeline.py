@@ -56,6 +56,14 @@ class Pipeline(Parameters):
             raise ValidationError(f"{origin}: not valid TOML: {error}") from None
         for change in changes:
             set_value(table, change)
+        return cls.of_table(table, origin, folder)
+
+    @classmethod
+    def of_table(cls, table: Mapping[str, Any], origin: str = "pipeline", folder: Path = Path()) -> Self:
+        """Read a pipeline from tables nested as in its TOML file: ``Pipeline.of_table(result.pipeline)``.
+
+        Raises as `loads` does.
+        """
         try:
             pipeline = cls.model_validate(table, context=Context(installed().find, folder))
         except pydantic.ValidationError as error:

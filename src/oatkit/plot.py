@@ -50,6 +50,8 @@ class Curve:
     """As matplotlib writes it: ``"-"``, ``"--"``, ``"o-"``."""
     spread: Sequence[float] | np.ndarray | None = None
     """Half the height of a band around the line, at each point."""
+    colour: int | None = None
+    """Number of its colour; None for its own number among the curves."""
 
 
 @dataclass(frozen=True)
@@ -100,8 +102,17 @@ def draw_plot(page: Page, plot: Plot, left: int, bottom: int, width: int, height
 
 def draw_curves(axes: Any, plot: Plot, style: Style, beside: bool = False) -> None:
     """Draw all of a plot but its title on matplotlib's axes; `beside` them or within them stands the legend."""
+    draw_lines(axes, plot, style)
+    _draw_axes(axes, plot, style)
+    if plot.labels:
+        where = {"loc": "upper left", "bbox_to_anchor": (1, 1)} if beside else {}
+        axes.legend(fontsize=6.5, frameon=False, labelcolor=style.ink, **where)
+
+
+def draw_lines(axes: Any, plot: Plot, style: Style) -> None:
+    """Draw what lies between the axes: curves, marks and verticals."""
     for i, curve in enumerate(plot.curves):
-        colour = style.of(i)
+        colour = style.of(i if curve.colour is None else curve.colour)
         axes.plot(curve.x, curve.y, curve.style, color=colour, linewidth=1, markersize=2.5, label=_literal(curve.label))
         if curve.spread is not None:
             low, high = np.subtract(curve.y, curve.spread), np.add(curve.y, curve.spread)
@@ -111,10 +122,6 @@ def draw_curves(axes: Any, plot: Plot, style: Style, beside: bool = False) -> No
         axes.plot([mark.x], [mark.y], "D", label=_literal(mark.label), **look)
     for x, label in plot.verticals:
         axes.axvline(x, color=style.pale, linewidth=0.8, linestyle=":", label=_literal(label))
-    _draw_axes(axes, plot, style)
-    if plot.labels:
-        where = {"loc": "upper left", "bbox_to_anchor": (1, 1)} if beside else {}
-        axes.legend(fontsize=6.5, frameon=False, labelcolor=style.ink, **where)
 
 
 def _draw_axes(axes: Any, plot: Plot, style: Style) -> None:

@@ -5,6 +5,7 @@ guard of its own, so that a broken one is listed with its reason and the rest wo
 """
 
 import inspect
+import os
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
@@ -15,10 +16,14 @@ from typing import Any
 import pluggy
 
 from oatkit import hookspecs
-from oatkit.api import KINDS, Plugin
+from oatkit.api import API_VERSION, KINDS, Plugin
 from oatkit.errors import PluginError, ValidationError
 from oatkit.names import did_you_mean
 
+GROUP = "oatkit"
+"""Of entry points."""
+ALLOWED = "OATKIT_PLUGINS"
+"""The environment variable that says whose plugins are loaded."""
 OURS = "oatkit"
 """The distribution whose plugins cannot be shadowed."""
 
@@ -83,8 +88,30 @@ class Registry:
 
 @cache
 def installed() -> Registry:
-    """Return the registry of everything installed here."""
-    return Registry(entry_points(group="oatkit"))
+    """Return the registry of everything installed here that the environment variable ``OATKIT_PLUGINS`` allows.
+
+    It lists distributions, with commas; or it is ``none``. What ships with oatkit is always there.
+    """
+    return Registry(point for point in entry_points(group=GROUP) if allowed(_distribution(point)[0]))
+
+
+def allowed(distribution: str) -> bool:
+    """Say whether the plugins of a distribution are to be loaded."""
+    chosen = os.environ.get(ALLOWED)
+    if chosen is None or distribution == OURS:
+        return True
+    return _normal(distribution) in {_normal(name) for name in chosen.split(",")}
+
+
+def distributions() -> list[str]:
+    """Return the names of all distributions that declare plugins, ours first; nothing of theirs is loaded."""
+    names = {_distribution(point)[0] for point in entry_points(group=GROUP)}
+    return sorted(names, key=lambda name: (name != OURS, name))
+
+
+def _normal(name: str) -> str:
+    """Return the name of a distribution as packaging compares them."""
+    return re.sub(r"[-_.]+", "-", name.strip()).lower()
 
 
 def _distribution(point: EntryPoint) -> tuple[str, str]:
@@ -98,7 +125,9 @@ def _load(point: EntryPoint) -> Iterator[Entry]:
     manager = pluggy.PluginManager("oatkit")
     manager.add_hookspecs(hookspecs)
     try:
-        manager.register(point.load(), name=point.name)
+        module = point.load()
+        _check_version(module)
+        manager.register(module, name=point.name)
         manager.check_pending()
     except (Exception, SystemExit) as error:
         yield replace(whole, problem=_reason(error))
@@ -112,6 +141,17 @@ def _load(point: EntryPoint) -> Iterator[Entry]:
                 continue
             for cls in classes:
                 yield _entry(kind, cls, whole)
+
+
+def _check_version(module: Any) -> None:
+    """Raise `PluginError` for a module that was made for a version of the API that this oatkit does not have."""
+    wanted = getattr(module, "OATKIT_API", API_VERSION)
+    if not (isinstance(wanted, tuple) and len(wanted) == 2 and all(isinstance(part, int) for part in wanted)):
+        raise PluginError(f"OATKIT_API is {wanted!r}; expected two whole numbers, as in {API_VERSION}")
+    if wanted[0] != API_VERSION[0] or wanted[1] > API_VERSION[1]:
+        made_for, here = (".".join(map(str, version)) for version in (wanted, API_VERSION))
+        which = "oatkit" if wanted > API_VERSION else "the plugin"
+        raise PluginError(f"made for version {made_for} of the plugin API, this oatkit has {here}: update {which}")
 
 
 def _entry(kind: str, cls: Any, whole: Entry) -> Entry:

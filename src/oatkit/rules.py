@@ -1,9 +1,11 @@
 """Rules in a pipeline: words that stand for numbers, replaced once for a scan, before anything is reconstructed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from oatkit import weights
-from oatkit.blame import blame
+from oatkit.api import Solver
 from oatkit.calibrating import asks_for_calibration, calibrate, calibrated
 from oatkit.data import Scan
 from oatkit.events import Listener, StepStarted, ignore
@@ -12,7 +14,10 @@ from oatkit.memo import Memo
 from oatkit.motion import Motion, find_motion
 from oatkit.pipeline import Pipeline
 from oatkit.problem import Calibration
-from oatkit.reconstruction import preprocess, problems, strongest
+from oatkit.reconstruction import preprocess, problems, raw_key, strongest
+
+BYTES_OF_POINT = 500
+"""Of the curve of a choice in a memo, about."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +37,22 @@ class Resolved:
     """Which pulses are out of place; None where nobody asked."""
     left_out: tuple[int, ...] = ()
     """Frames of the scan that are not run, since they are out of place."""
+    known: Mapping[str, Mapping[str, Any]] | None = None
+    """The `choices`, where they were made by an earlier run."""
+
+    @property
+    def choices(self) -> Mapping[str, Mapping[str, Any]]:
+        """How each number was chosen, as plain values, by its field in a `Result`; empty tables where none was."""
+        found = {"speed_choice": self.speed, "weight_choice": self.weight, "calibration_choice": self.calibration}
+        return self.known or {name: choice.table() if choice else {} for name, choice in found.items()}
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What to know before trusting the choices."""
-        found = (self.speed, self.weight, self.calibration, self.motion)
+        chosen = [note for choice in self.choices.values() for note in choice.get("notes", ())]
+        moved = self.motion.notes if self.motion else ()
         left_out = (f"left out: frames {', '.join(map(str, self.left_out))} (motion)",) if self.left_out else ()
-        return (*(note for part in found if part for note in part.notes), *left_out)
+        return (*chosen, *moved, *left_out)
 
     def notes_on(self, frame: int) -> tuple[str, ...]:
         """What to know of one frame of the scan."""
@@ -54,14 +68,10 @@ def resolve(
     ``scan.rules = "frame"`` asks for it; in this order, since each depends on those before; the first two on its
     strongest wavelength (the one of the largest signals). Numbers are left alone.
     """
-    frame = frame if pipeline.scan.rules == "frame" else 0
+    frame = frame_of_rules(pipeline, frame)
     memo = Memo() if memo is None else memo
     motion = motion_in(pipeline, scan, memo, on_event)
-    speed = None
-    ready = pipeline
-    if pipeline.scan.speed_of_sound_m_s == "focus":
-        speed = focus(pipeline, scan, frame=frame, memo=memo, on_event=on_event)
-        ready = speed.apply(pipeline)
+    ready, speed = with_speed(pipeline, scan, frame, memo, on_event)
     weight, calibration = None, None
     if isinstance(getattr(pipeline.reconstruct, "weight", None), str):
         ready, weight = _weighted(ready, scan, frame, memo, on_event)
@@ -71,16 +81,47 @@ def resolve(
     return Resolved(ready, pipeline, weight, speed, calibration, motion)
 
 
+def frame_of_rules(pipeline: Pipeline, frame: int) -> int:
+    """Return which frame the rules look at where `frame` is to be run."""
+    return frame if pipeline.scan.rules == "frame" else 0
+
+
+def with_speed(
+    pipeline: Pipeline, scan: Scan, frame: int, memo: Memo, on_event: Listener = ignore
+) -> tuple[Pipeline, Focus | None]:
+    """Return the pipeline with its speed of sound chosen on a frame, and how; None where it was no rule."""
+    if pipeline.scan.speed_of_sound_m_s != "focus":
+        return pipeline, None
+    speed = focus(pipeline, scan, frame=frame, memo=memo, on_event=on_event)
+    return speed.apply(pipeline), speed
+
+
+def remember_choice(choice: weights.Choice, pipeline: Pipeline, scan: Scan, frame: int, memo: Memo) -> None:
+    """Let `resolve` find what the rule of a choice gave on the strongest wavelength of a frame.
+
+    The pipeline is one that `with_speed` returned; its weight may be any.
+    """
+    solver = pipeline.reconstruct.model_copy(update={"weight": choice.rule})
+    memo.put(_choice_key(pipeline, scan, frame, solver), choice, BYTES_OF_POINT * len(choice.curve))
+
+
+def _choice_key(pipeline: Pipeline, scan: Scan, frame: int, solver: Solver) -> tuple[Any, ...]:
+    return ("weight", *raw_key(pipeline, scan, frame), pipeline.grid, pipeline.forward, solver)
+
+
 def _weighted(
     pipeline: Pipeline, scan: Scan, frame: int, memo: Memo, on_event: Listener
-) -> tuple[Pipeline, weights.Choice | None]:
-    """Return the pipeline with its weight chosen, and how."""
-    on_event(StepStarted("choosing the weight"))
-    clean = strongest(preprocess(pipeline, scan, frame, memo))
-    _, problem = next(problems(pipeline, clean, pipeline.grid.grid(), memo))
-    with blame(pipeline.reconstruct):
-        solver, choice = weights.resolve(pipeline.reconstruct, problem)
-    return pipeline.with_solver(solver), choice
+) -> tuple[Pipeline, weights.Choice]:
+    """Return the pipeline with its weight chosen, and how; a choice that is known is not made again."""
+    solver = pipeline.reconstruct
+    choice = memo.peek(_choice_key(pipeline, scan, frame, solver))
+    if choice is None:
+        on_event(StepStarted(weights.CHOOSING))
+        clean = strongest(preprocess(pipeline, scan, frame, memo))
+        _, problem = next(problems(pipeline, clean, pipeline.grid.grid(), memo))
+        choice = weights.choose(solver, problem, getattr(solver, "weight", ""), on_event=on_event)
+        remember_choice(choice, pipeline, scan, frame, memo)
+    return pipeline.with_solver(weights.with_weight(solver, choice.weight)), choice
 
 
 def motion_in(pipeline: Pipeline, scan: Scan, memo: Memo, on_event: Listener = ignore) -> Motion | None:

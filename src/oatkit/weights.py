@@ -4,14 +4,16 @@ No rule is safe (their picks differ by decades on the same data), so a `Choice` 
 rules would have picked, and a note where they disagree.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from oatkit.api import Problem, Solver
+from oatkit.api import Iterate, Problem, Solver
+from oatkit.blame import blame
 from oatkit.errors import ValidationError
+from oatkit.events import Listener, StepStarted, ignore
 from oatkit.masking import without_rows
 from oatkit.vectors import norm
 
@@ -24,6 +26,9 @@ The best weight of every built-in solver lay inside for simulated breast, star a
 
 HELD_OUT = 7
 """Every seventh detector is kept back by the rule "hold-out"."""
+
+CHOOSING = "choosing the weight"
+"""What listeners are told."""
 
 DISAGREEMENT = 10.0
 """Picks of two rules that differ by more than this factor are worth a note."""
@@ -72,12 +77,25 @@ class Choice:
         return asdict(self) | {"picks": dict(self.picks), "disagreement": self.disagreement}
 
 
-def resolve(solver: Solver, problem: Problem) -> tuple[Solver, Choice | None]:
-    """Return the solver with a number for its weight, and how that was chosen; None where it was a number already."""
+PointListener = Callable[[CurvePoint, Iterate], None]
+"""Shown each point of a curve, with the last iterate of the solver there."""
+
+
+def ignore_point(point: CurvePoint, last: Iterate) -> None:
+    """Look at no point."""
+
+
+def resolve(
+    solver: Solver, problem: Problem, on_event: Listener = ignore, on_point: PointListener = ignore_point
+) -> tuple[Solver, Choice | None]:
+    """Return the solver with a number for its weight, and how that was chosen; None where it was a number already.
+
+    Tells and raises what `choose` does.
+    """
     rule = getattr(solver, "weight", None)
     if not isinstance(rule, str):
         return solver, None
-    choice = choose(solver, problem, rule)
+    choice = choose(solver, problem, rule, None, on_event, on_point)
     return with_weight(solver, choice.weight), choice
 
 
@@ -86,41 +104,82 @@ def with_weight(solver: Solver, weight: float) -> Solver:
     return solver.model_copy(update={"weight": float(weight)})
 
 
-def choose(solver: Solver, problem: Problem, rule: str, candidates: Sequence[float] | None = None) -> Choice:
+def choose(
+    solver: Solver,
+    problem: Problem,
+    rule: str,
+    candidates: Sequence[float] | None = None,
+    on_event: Listener = ignore,
+    on_point: PointListener = ignore_point,
+) -> Choice:
     """Solve the problem at each candidate weight and pick one by `rule`.
 
     ``"l-curve"`` takes the corner of the L-curve, ``"hold-out"`` the weight whose image predicts the signals of every
-    seventh detector best when it is made from the others. Raises `ValidationError` for an unknown rule, for fewer than
-    five or non-positive candidates, for a solver without a weight, for a weight in absolute units without candidates
-    of its own, and for a hold-out without fourteen detectors.
+    seventh detector best when it is made from the others. `on_event` is told before each candidate how many are done,
+    `on_point` is shown each point; every candidate is solved from the solver's own start, so that its image is the one
+    that the solver gives at that weight. What the solver raises beside our errors becomes a `PluginError`. Raises
+    `ValidationError` for an unknown rule, for fewer than five or non-positive candidates, for a solver without a
+    weight, for a weight in absolute units without candidates of its own, for data that are zero, and for a hold-out
+    without fourteen detectors.
     """
     if rule not in get_args(Rule):
         raise ValidationError(f"weight: no rule named '{rule}'; expected {' or '.join(get_args(Rule))}")
-    weights = _checked(solver, candidates)
+    weights = weights_to_try(solver, candidates)
     if not problem.data.any():
         raise ValidationError("weight: the data are zero, so that no rule can choose; take a number")
     fit, rows = (problem, None) if rule == "l-curve" else _keep_back(problem)
-    curve = tuple(sweep(solver, fit, weights, problem, rows))
+    curve = tuple(sweep(solver, fit, weights, problem, rows, on_event, on_point))
     picks = _picks(curve)
     weight = picks["curvature" if rule == "l-curve" else "prediction"]
     return Choice(rule, weight, curve, tuple(picks.items()), tuple(_notes(weight, curve, picks)))
 
 
+def weights_to_try(solver: Solver, candidates: Sequence[float] | None = None) -> list[float]:
+    """Return the candidates (`CANDIDATES` unless others are given) by rising weight, each once.
+
+    Raises the `ValidationError` of `choose` for a solver and candidates that do not go together.
+    """
+    if "weight" not in type(solver).model_fields:
+        raise ValidationError(f"solver '{solver.name}' has no weight to choose")
+    if candidates is None and getattr(solver, "scaling", "relative") == "absolute":
+        raise ValidationError(
+            "weight: a rule searches dimensionless weights; take scaling = 'relative', or call oatkit.weights.choose "
+            "with candidates in the units of the formula"
+        )
+    weights = sorted({float(weight) for weight in (CANDIDATES if candidates is None else candidates)})
+    if len(weights) < 5 or not all(0 < weight < np.inf for weight in weights):
+        raise ValidationError(f"candidates: expected five or more different weights above 0, got {weights}")
+    return weights
+
+
 def sweep(
-    solver: Solver, fit: Problem, weights: Sequence[float], whole: Problem, held_out: np.ndarray | None
+    solver: Solver,
+    fit: Problem,
+    weights: Sequence[float],
+    whole: Problem,
+    held_out: np.ndarray | None,
+    on_event: Listener = ignore,
+    on_point: PointListener = ignore_point,
 ) -> Iterator[CurvePoint]:
     """Yield what each weight gives on the problem `fit`, and how well it predicts the rows `held_out` of `whole`."""
-    for weight in weights:
-        last = with_weight(solver, weight).solve(fit)
-        if not (np.isfinite(last.residual_norm) and np.isfinite(last.penalty)):
-            raise ValidationError(
-                f"solver '{solver.name}' reports no residual norm or no penalty: its weight must be a number"
-            )
-        point = CurvePoint(weight, last.residual_norm, last.penalty, converged=last.converged)
-        if held_out is not None:
-            misfit = (whole.forward(last.image) - whole.data)[held_out]
-            point = replace(point, prediction_error=norm(misfit))
+    for done, weight in enumerate(weights):
+        on_event(StepStarted(f"{CHOOSING}, {done} of {len(weights)} done"))
+        with blame(solver):
+            last = with_weight(solver, weight).solve(fit)
+            point = _point(solver, weight, last)
+            if held_out is not None:
+                misfit = (whole.forward(last.image) - whole.data)[held_out]
+                point = replace(point, prediction_error=norm(misfit))
+        on_point(point, last)
         yield point
+
+
+def _point(solver: Solver, weight: float, last: Iterate) -> CurvePoint:
+    if not (np.isfinite(last.residual_norm) and np.isfinite(last.penalty)):
+        raise ValidationError(
+            f"solver '{solver.name}' reports no residual norm or no penalty: its weight must be a number"
+        )
+    return CurvePoint(weight, last.residual_norm, last.penalty, converged=last.converged)
 
 
 def l_curve_corner(weights: Sequence[float], residual_norms: Sequence[float], penalties: Sequence[float]) -> int:
@@ -156,20 +215,6 @@ def _l_curve(weights: Sequence[float], residual_norms: Sequence[float], penaltie
     tiny = np.finfo(float).tiny
     curve = np.log(np.maximum([residual, penalty], tiny)) * [[1.0], [0.5]]
     return curve if w[0] < w[-1] else curve[::-1]
-
-
-def _checked(solver: Solver, candidates: Sequence[float] | None) -> list[float]:
-    if "weight" not in type(solver).model_fields:
-        raise ValidationError(f"solver '{solver.name}' has no weight to choose")
-    if candidates is None and getattr(solver, "scaling", "relative") == "absolute":
-        raise ValidationError(
-            "weight: a rule searches dimensionless weights; take scaling = 'relative', or call oatkit.weights.choose "
-            "with candidates in the units of the formula"
-        )
-    weights = sorted({float(weight) for weight in (CANDIDATES if candidates is None else candidates)})
-    if len(weights) < 5 or not all(0 < weight < np.inf for weight in weights):
-        raise ValidationError(f"candidates: expected five or more different weights above 0, got {weights}")
-    return weights
 
 
 def _keep_back(problem: Problem) -> tuple[Problem, np.ndarray]:

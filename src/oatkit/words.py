@@ -8,7 +8,7 @@ from oatkit.data import Image
 
 SENSITIVITIES = {"so2_sensitivity_scattering": "mu_s'", "so2_sensitivity_calibration": "K"}
 """Changes of so2, and of what they are the consequence."""
-SIGNED = ("boundary", "change", "area_under_curve", "wash_in_slope", *SENSITIVITIES)
+SIGNED = ("boundary", "difference", "change", "area_under_curve", "wash_in_slope", *SENSITIVITIES)
 """Quantities that are negative by nature."""
 FRACTIONS = ("so2",)
 """Quantities that lie in 0 .. 1 and are shown in that range, whatever values they take."""

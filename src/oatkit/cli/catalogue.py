@@ -1,12 +1,13 @@
 """Commands that tell what is there: presets and plugins."""
 
 import json
-from typing import Annotated
+from dataclasses import asdict
+from typing import Annotated, Any
 
 import typer
 
 from oatkit.cli.app import AsJson, command
-from oatkit.errors import ValidationError
+from oatkit.errors import PluginError, ValidationError
 
 
 @command
@@ -26,17 +27,64 @@ def pipeline(
 
 
 @command
-def plugins(as_json: AsJson = False) -> None:
-    """List all plugins by kind; for a broken one, the reason."""
-    from oatkit.registry import installed
+def plugins(
+    as_json: AsJson = False,
+    check: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Load the plugins of one distribution, or of `all`, in a process of their own, where they can neither "
+            "crash nor hang this one, and see whether they keep what users rely on (`oatkit.testing`).",
+        ),
+    ] = "",
+    seconds: Annotated[
+        float,
+        typer.Option(min=0.1, help="How long --check waits for each distribution to load; checks have ten times that."),
+    ] = 60.0,
+) -> None:
+    """List all plugins by kind; for a broken one, the reason. OATKIT_PLUGINS=none starts without anybody else's."""
+    if check:
+        _check(check, seconds, as_json)
+        return
+    from oatkit.registry import ALLOWED, allowed, distributions, installed
 
     rows = [entry.row() for entry in installed().entries]
     if as_json:
         typer.echo(json.dumps(rows, indent=2))
         return
     for row in sorted(rows, key=lambda r: (r["kind"] or "~", r["name"])):
-        problem = f"  {row['status']}: {row['problem']}" if row["problem"] else ""
-        typer.echo(f"{row['kind'] or '-':<14} {row['name']:<16} {row['distribution']} {row['version']}{problem}")
+        typer.echo(_line(row))
+    left_out = [name for name in distributions() if not allowed(name)]
+    if left_out:
+        typer.echo(f"left out by {ALLOWED}: {', '.join(left_out)}")
+
+
+def _check(name: str, seconds: float, as_json: bool) -> None:
+    from oatkit.trial import distributions_of, try_out
+
+    trials = [try_out(distribution, seconds) for distribution in distributions_of(name)]
+    if as_json:
+        typer.echo(json.dumps([asdict(trial) for trial in trials], indent=2))
+    for trial in trials if not as_json else ():
+        for row in trial.rows:
+            typer.echo(_line(row))
+            for sentence in row.get("violations", ()):
+                typer.echo(f"    {sentence}")
+            if row.get("unchecked"):
+                typer.echo(f"    not checked: {row['unchecked']}")
+        if trial.problem:
+            typer.echo(f"{'-':<14} {'-':<16} {trial.distribution}  broken: {trial.problem}")
+    wrong = [trial.distribution for trial in trials if not trial.fine]
+    if wrong:
+        raise PluginError(f"not all plugins can be used: {', '.join(wrong)}")
+    untrue = [trial.distribution for trial in trials if trial.violations]
+    if untrue:
+        raise PluginError(f"not all plugins keep their promises: {', '.join(untrue)}")
+
+
+def _line(row: dict[str, Any]) -> str:
+    problem = f"  {row['status']}: {row['problem']}" if row["problem"] else ""
+    return f"{row['kind'] or '-':<14} {row['name']:<16} {row['distribution']} {row['version']}{problem}"
 
 
 @command

@@ -44,6 +44,9 @@ def run(
     changes: Changes = [],  # noqa: B006 - typer wants a plain list
     frames: Annotated[str, typer.Option(metavar="A:B", help="Which frames, as a Python slice, or one number.")] = ":",
     overwrite: Overwrite = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with a run that was interrupted; start where there was none.")
+    ] = False,
 ) -> None:
     """Run a pipeline over a scan and write the images, with how they came about, to a folder."""
     from oatkit.batch import run_frames
@@ -56,10 +59,10 @@ def run(
     loaded = Pipeline.load(pipeline, changes)
     found = read(scan)
     chosen = frames_in(frames, found.frames)
-    check_new(output, overwrite)
+    check_new(output, overwrite or resume)
     with ProgressBar(len(chosen)) as bar:
         result = run_frames(
-            loaded, found, output, chosen, bar.show, on_frame=lambda frame: bar.next_frame(), overwrite=overwrite
+            loaded, found, output, chosen, bar.show, lambda frame: bar.next_frame(), overwrite=overwrite, resume=resume
         )
     for line in summary(result):
         typer.echo(line)

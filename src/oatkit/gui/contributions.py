@@ -9,9 +9,9 @@ import napari
 
 from oatkit.errors import ValidationError
 from oatkit.export import export
-from oatkit.gui.layers import KEY
+from oatkit.gui.images.layers import KEY
 from oatkit.gui.opening import SCAN, can_open, open_path, open_sample
-from oatkit.gui.quick_look import awaited
+from oatkit.gui.preview.quick_look import awaited
 from oatkit.gui.workbench import Workbench, workbench
 from oatkit.result import Result
 

@@ -83,6 +83,18 @@ class PipelineDocument:
             table[key] = _plain(value)
         self._take(tomlkit.dumps(document))
 
+    def put(self, slot: str, values: Mapping[str, Any]) -> None:
+        """Put other keys in place of all that the table of a step has, as one edit."""
+        document = self._document()
+        new = slot not in document
+        table = _table(document, slot, None)
+        for old in list(table):
+            del table[old]
+        for key, value in values.items():
+            table[key] = _plain(value)
+        text = tomlkit.dumps(document)
+        self._take(_spaced(text) if new else text)
+
     def replace(self, text: str) -> None:
         """Take another text in place of this one, as an edit that can be undone."""
         self._take(text)

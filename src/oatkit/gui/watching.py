@@ -6,6 +6,7 @@ from typing import Any
 from qtpy.QtCore import QTimer
 
 from oatkit.gui.job import Job
+from oatkit.gui.leaving import when_gone
 
 PERIOD_MS = 40
 
@@ -28,5 +29,5 @@ def watch(job: Job, take: Callable[[Any], None], fail: Callable[[str], None], wi
                 fail(job.failure.sentence)
 
     timer.timeout.connect(look)
-    timer.destroyed.connect(lambda *_: job.cancel())
+    when_gone(timer, job.cancel)
     timer.start(PERIOD_MS)

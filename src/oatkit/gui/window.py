@@ -20,6 +20,8 @@ def make_window(file: Path | None = None, show: bool = True) -> napari.Viewer:
     viewer = napari.Viewer(title="oatkit", show=False)
     try:
         docks = [viewer.window.add_plugin_dock_widget(NAME, name, tabify=True)[0] for name in widget_names()]
+        for dock, name in zip(docks, widget_names(), strict=True):
+            dock.setWindowTitle(name)  # napari adds the name of the plugin, for which tabs have no room
         docks[0].raise_()
         if file is not None:
             open_path(workbench(viewer), file)

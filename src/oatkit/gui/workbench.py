@@ -5,10 +5,11 @@ from typing import Any
 from psygnal import Signal
 
 from oatkit.gui.document import PipelineDocument
-from oatkit.gui.layers import Layers
+from oatkit.gui.images.layers import Layers
+from oatkit.gui.images.side_by_side import SideBySide
+from oatkit.gui.images.viewing import Viewing
 from oatkit.gui.session import Session
 from oatkit.gui.settings import MB, Settings
-from oatkit.gui.viewing import Viewing
 from oatkit.memo import Memo
 
 
@@ -21,6 +22,8 @@ class Workbench:
     """An edit of the pipeline, also one that was taken back."""
     result_changed = Signal()
     """A run has ended with images."""
+    run_wanted = Signal()
+    """Somebody asks the widget that runs the pipeline to do so."""
 
     def __init__(self, viewer: Any) -> None:
         self.viewer = viewer
@@ -29,6 +32,7 @@ class Workbench:
         self.live_preview = settings.live_preview
         self.layers = Layers(viewer)
         self.viewing = Viewing(viewer, self.layers)
+        self.side_by_side = SideBySide(self.layers, self.viewing)
 
 
 NAME = "_oatkit_workbench"

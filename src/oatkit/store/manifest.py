@@ -35,18 +35,20 @@ FrameKey = Annotated[str, StringConstraints(pattern=r"^(0|[1-9][0-9]{0,6})$")]
 """Keys of JSON are text: the number of a frame within the result."""
 
 
-class _Entry(BaseModel):
+class Entry(BaseModel):
+    """A part of what a result folder says of itself: strict, and frozen."""
+
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid")
 
 
-class FileEntry(_Entry):
+class FileEntry(Entry):
     """What a file was when it was written."""
 
     size: int
     sha256: str
 
 
-class GridEntry(_Entry):
+class GridEntry(Entry):
     """A `Grid`."""
 
     shape: tuple[Size, Size]
@@ -63,7 +65,7 @@ class GridEntry(_Entry):
         return Grid(self.shape, self.pixel_size_m, self.centre_m)
 
 
-class ImageEntry(_Entry):
+class ImageEntry(Entry):
     """What the images of one name have in common in all frames."""
 
     quantity: str
@@ -90,14 +92,14 @@ class ImageEntry(_Entry):
         return (max(1, len(self.wavelengths_nm)), *self.grid.shape)
 
 
-class MadeEntry(_Entry):
+class MadeEntry(Entry):
     """How one image of one frame was made."""
 
     history: tuple[Plain, ...]
     diagnostics: Plain
 
 
-class FrameEntry(_Entry):
+class FrameEntry(Entry):
     """What differs between frames."""
 
     frame_index: int
@@ -124,7 +126,7 @@ class FrameEntry(_Entry):
         return cls.model_validate_json(json.dumps(encode(frame, f"frame {result.frame_index}")))
 
 
-class Manifest(_Entry):
+class Manifest(Entry):
     """All that is known about a result folder."""
 
     format: Literal["oatkit-result"] = "oatkit-result"

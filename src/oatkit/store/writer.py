@@ -1,6 +1,7 @@
 """Writing a result folder; `oatkit.store` describes it."""
 
 import os
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -13,9 +14,11 @@ from pydantic import ValidationError as Invalid
 from oatkit.atomic import check_output, check_space, new_folder, sync
 from oatkit.data import Image
 from oatkit.errors import ResultError, ValidationError
-from oatkit.plain import encode
+from oatkit.plain import decode, encode
 from oatkit.result import Result
 from oatkit.store.arrays import attributes, create_array
+from oatkit.store.journal import Begun, Failed, Line, Story, Written, add
+from oatkit.store.lock import locked
 from oatkit.store.manifest import (
     BY_FRAME,
     FILE_NAME,
@@ -28,6 +31,7 @@ from oatkit.store.manifest import (
     digest,
     write_manifest,
 )
+from oatkit.store.unfinished import Unfinished
 
 _COMMON = ("pipeline", "requested", "versions", "scan", "weight_choice", "speed_choice", "calibration_choice")
 """What is stored once for all frames, from the first one written."""
@@ -42,15 +46,30 @@ class StoreWriter:
 
     The folder takes its name when the block ends well; an exception (Ctrl-C too) leaves nothing. `source` is the path
     of the input, which the output may not touch. Raises `ResultError` on entering where the output exists already and
-    `overwrite` is not asked for, or cannot be written; only a result folder is ever overwritten.
+    `overwrite` is not asked for, cannot be written or is being written by somebody else; only a result folder is ever
+    overwritten.
+
+    With `run` (plain values that say who asked for what) the frames that are done stay in a hidden folder when an
+    exception, a kill or a power cut ends the block. Entered once more, with `resume`, the writer knows them (`done`)
+    and takes the others; without it, it refuses to throw them away unless `overwrite` is asked for. Raises
+    `ValidationError` where they are of another run.
     """
 
-    def __init__(self, path: str | Path, frames: int = 1, source: str = "", overwrite: bool = False) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        frames: int = 1,
+        source: str = "",
+        overwrite: bool = False,
+        run: Mapping[str, Any] | None = None,
+        resume: bool = False,
+    ) -> None:
         if not frames >= 1:
             raise ValidationError(f"{path}: a result has at least one frame, got {frames}")
         self.path = Path(path)
         self.frames = frames
-        self._source, self._overwrite = source, overwrite
+        self._source, self._overwrite, self._resume = source, overwrite, resume
+        self._unfinished = Unfinished(self.path, run) if run is not None else None
         self._stack = ExitStack()
         self._arrays: dict[str, Any] = {}
         self._common: dict[str, Any] = {}
@@ -59,11 +78,29 @@ class StoreWriter:
         self._failed: dict[str, str] = {}
         self._files: dict[str, FileEntry] = {}
 
+    @property
+    def done(self) -> set[int]:
+        """Frames that are written, or known to have failed."""
+        return {int(index) for index in (*self._records, *self._failed)}
+
+    @property
+    def common(self) -> Mapping[str, Any]:
+        """What all frames have in common: ``pipeline`` as run, choices, ...; empty before the first is written."""
+        return decode(self._common)
+
     def __enter__(self) -> Self:
         check_output(self.path, [self._source], self._overwrite)
-        if os.path.lexists(self.path) and not _looks_like_a_result(self.path):
-            raise ResultError(f"{self.path}: is no oatkit result, so it is not overwritten; choose another name")
-        self._folder = self._stack.enter_context(new_folder(self.path, self._overwrite))
+        with ExitStack() as stack:
+            stack.enter_context(locked(self.path))
+            check_output(self.path, overwrite=self._overwrite)  # another run may have ended while we came here
+            if os.path.lexists(self.path) and not _looks_like_a_result(self.path):
+                raise ResultError(f"{self.path}: is no oatkit result, so it is not overwritten; choose another name")
+            story = self._unfinished.story(self.frames, self._resume, self._overwrite) if self._unfinished else None
+            hidden = self._unfinished.folder if self._unfinished else None
+            self._folder = stack.enter_context(new_folder(self.path, self._overwrite, hidden, self._worth_keeping))
+            if story is not None:
+                self._take_up(story)
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(
@@ -73,6 +110,8 @@ class StoreWriter:
             return self._stack.__exit__(kind, error, trace)
         with self._stack:
             self._finish()
+        if self._unfinished is not None:
+            self._unfinished.journal.unlink(missing_ok=True)
         return None
 
     def write(self, index: int, result: Result) -> None:
@@ -93,6 +132,7 @@ class StoreWriter:
             for name, image in result.items():
                 self._arrays[name][index] = image.values
                 self._seal(chunk_file(name, index))
+            self._note(Written(index=str(index), record=record, files=self._chunks(result, index)))
         except OSError as error:
             raise ResultError(f"{self.path}: could not be written: {error.strerror or error}") from error
         self._records[str(index)] = record
@@ -100,6 +140,8 @@ class StoreWriter:
     def fail(self, index: int, reason: str) -> None:
         """Record that frame `index` has no images, and why."""
         self._check_new(index)
+        if self._common:  # before the first frame with images there is no diary; such frames are run again
+            self._note(Failed(index=str(index), reason=reason))
         self._failed[str(index)] = reason
 
     def _check_new(self, index: int) -> None:
@@ -122,6 +164,38 @@ class StoreWriter:
         for name, entry in self._images.items():
             self._arrays[name] = create_array(group, name, entry, self.frames)
             self._seal(f"{name}/zarr.json")
+        if self._unfinished is not None:
+            run = encode(self._unfinished.run)
+            self._note(Begun(run=run, common=self._common, images=self._images, files=dict(self._files)))
+
+    def _take_up(self, story: Story) -> None:
+        """Go on with the frames of an interrupted run."""
+        import zarr
+
+        head = story.head
+        self._common, self._images = {key: encode(value) for key, value in head.common.items()}, dict(head.images)
+        self._files = dict(head.files)
+        for index, frame in story.written.items():
+            self._records[index] = frame.record
+            self._files |= frame.files
+        self._failed = dict(story.failed)
+        # zarr would try to read what is there of a frame before it writes it anew, and it may be torn.
+        for path in self._folder.rglob("*"):
+            if path.is_file() and path.relative_to(self._folder).as_posix() not in self._files:
+                path.unlink()
+        group: Any = zarr.open_group(self._folder, mode="r+", zarr_format=3, use_consolidated=False)
+        self._arrays = {name: group[name] for name in self._images}
+
+    def _note(self, line: Line) -> None:
+        """Write a line into the diary, where there is one."""
+        if self._unfinished is not None:
+            add(self._unfinished.journal, line)
+
+    def _worth_keeping(self) -> bool:
+        return self._unfinished is not None and bool(self._records)
+
+    def _chunks(self, result: Result, index: int) -> dict[str, FileEntry]:
+        return {file: self._files[file] for file in (chunk_file(name, index) for name in result)}
 
     def _check_alike(self, index: int, result: Result) -> None:
         if {name: ImageEntry.of(image) for name, image in result.items()} != self._images:

@@ -12,8 +12,9 @@ from oatkit.builtin.forward.windows import reached
 from oatkit.errors import ValidationError
 from oatkit.threads import for_each
 
-BLOCKS = 16
-"""Pieces of work. Fixed, so that sums are taken in one order whatever the number of threads."""
+BLOCKS, SMALLEST = 16, 2**18
+"""Most pieces of work, and the least pairs of pixel and detector in each: handing over smaller ones takes longer than
+the work. Both are fixed, so that sums are taken in one order whatever the number of threads."""
 
 TAIL_PIXELS = 16
 """How far the ringing of a band-limited pixel is followed: cutting it there changes the signals of one pixel, of white
@@ -50,7 +51,9 @@ class ArcOperator:
         self.windows = reach.widened(response.before, response.after)
         self.filter = pixel_filter(geometry, grid, response, reach.length, self.dtype)
         self._measure_in_steps_of_the_fine_axis(geometry, grid, reach.first)
-        self.blocks = np.array_split(np.arange(len(reach.first)), min(BLOCKS, len(reach.first)))
+        count = len(reach.first)
+        pieces = min(BLOCKS, count, max(2, count * self.shape[1] // SMALLEST))
+        self.blocks = np.array_split(np.arange(count), pieces)
 
     def _measure_in_steps_of_the_fine_axis(self, geometry: Geometry, grid: Grid, first: np.ndarray) -> None:
         finer = self.filter.fft_in / self.filter.fft_out

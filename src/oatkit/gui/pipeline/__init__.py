@@ -1,0 +1,1 @@
+"""The pipeline beside the picture: its steps as cards, what runs them, and what a run tells."""

@@ -1,0 +1,1 @@
+"""Spectra and line profiles where the user points."""

@@ -1,0 +1,1 @@
+"""Regions of interest and the boundary, drawn by hand."""

@@ -1,0 +1,1 @@
+"""What is looked at: wavelength, results side by side, chromophores."""

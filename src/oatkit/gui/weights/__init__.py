@@ -1,0 +1,1 @@
+"""The regularization weight, chosen on the L-curve."""
