@@ -145,10 +145,10 @@ def test_other_layers_are_not_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_three_clicks_to_a_sample(make_napari_viewer_proxy, qtbot, small_scan, small_scan_file, monkeypatch):
+def test_three_clicks_to_a_sample(make_napari_viewer_proxy, qtbot, small_scan, small_scan_file, monkeypatch, tmp_path):
     """A sample opens beside the window: its scan is the session's, its picture takes the place of the empty layer.
 
-    A file dropped on the same viewer then replaces both, and one that is damaged leaves them.
+    A file dropped on the same viewer then replaces both; one that is damaged leaves them, and is one sentence.
     """
     monkeypatch.setattr(opening, "SAMPLES", {"breast": lambda: small_scan})
     viewer = make_napari_viewer_proxy()
@@ -163,6 +163,12 @@ def test_three_clicks_to_a_sample(make_napari_viewer_proxy, qtbot, small_scan, s
     wait_for(lambda: bench.layers.find("scan").name == f"scan {bench.session.scan.name}", qtbot)
     assert bench.session.scan.source.endswith("small.h5")
     assert len(viewer.layers) == 1
+    said = []
+    monkeypatch.setattr(contributions, "show_error", said.append)
+    (tmp_path / "bad.msot").write_text("<no xml")
+    assert contributions.read(str(tmp_path / "bad.msot")) == contributions.SHOWN_ALREADY
+    assert bench.session.scan.source.endswith("small.h5")
+    assert [sentence.startswith(str(tmp_path / "bad.msot: ")) for sentence in said] == [True]
 
 
 def test_the_window_opens_with_its_widgets_and_a_file(make_napari_viewer, result_folder, monkeypatch):

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import napari
+from napari.utils.notifications import show_error
 
-from oatkit.errors import ValidationError
+from oatkit.errors import OatkitError, ValidationError
 from oatkit.export import export
 from oatkit.gui.images.layers import KEY
 from oatkit.gui.opening import SCAN, can_open, open_path, open_sample
@@ -26,10 +27,16 @@ def get_reader(path: str | Sequence[str]) -> Callable[[str], list[LayerData]] | 
 
 
 def read(path: str) -> list[LayerData]:
-    """Open a path in the viewer of the window; without a window, return its layers. Raises what `open_path` raises."""
+    """Open a path in the viewer of the window, where an error is one sentence; without a window, return its layers.
+
+    Raises what `open_path` raises, without a window.
+    """
     viewer = napari.current_viewer()
     if viewer is not None:
-        open_path(workbench(viewer), Path(path))
+        try:
+            open_path(workbench(viewer), Path(path))
+        except OatkitError as error:  # napari would put its own page of text about it
+            show_error(str(error))
         return SHOWN_ALREADY
     bench = _without_window()
     open_path(bench, Path(path))

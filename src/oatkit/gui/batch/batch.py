@@ -70,6 +70,8 @@ def _run_one(job: Job, index: int, pipeline: Pipeline, path: Path, output: Path,
         done += 1
         job.show(FileStatus(index, "running", f"{done} of {scan.frames} frames"))
 
-    result = run_frames(pipeline, scan, output, on_event=check, on_frame=count, overwrite=overwrite)
+    result = run_frames(
+        pipeline, scan, output, on_event=check, on_frame=count, overwrite=overwrite, resume=not overwrite
+    )
     failed = f"; {len(result.failed)} of {result.frames} frames failed" if result.failed else ""
     return f"{output.name}{failed}"

@@ -48,7 +48,7 @@ class PipelineWidget(QWidget):
         column.addWidget(self.stack, 1)
         column.addWidget(self.preview)
         column.addWidget(self.panel)
-        self.setMinimumWidth(360)
+        self.setMinimumWidth(316)
         self._connect()
 
     def edit(self, change: Callable[[PipelineDocument], None]) -> None:

@@ -73,7 +73,7 @@ class Tools(QWidget):
             mode: {name: button(name, f"{name.lower()} on the image", checkable=True) for name in names}
             for mode, names in SHAPES.items()
         }
-        self.hint = QLabel()
+        self.hint = QLabel(HINTS[""])
         self.hint.setWordWrap(True)
         self.pin = button("Pin", "keep this place, to compare others with it")
         self.unpin = button("Unpin", "let go of pinned places")

@@ -56,7 +56,7 @@ class ViewWidget(QWidget):
         outside = QVBoxLayout(self)
         outside.setContentsMargins(0, 0, 0, 0)
         outside.addWidget(area)
-        self.setMinimumWidth(340)
+        self.setMinimumWidth(316)
 
     def show_state(self) -> None:
         """Show what there is to compare and to look at."""
