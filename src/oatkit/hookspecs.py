@@ -58,14 +58,20 @@ def oatkit_solvers() -> list[type[Solver]]:  # type: ignore[empty-body]
 
     class Landweber(Solver):
         name = "landweber"
-        n_iterations: int = param(50, "number of steps", at_least=1)
+        n_iterations: int = param(500, "largest number of steps", at_least=1)
 
         def iterate(self, problem):
             x = np.zeros(problem.shape)
-            for i in range(self.n_iterations):
-                r = problem.forward(x) - problem.data
-                x = x - problem.adjoint(r) / problem.norm**2
-                yield Iterate(x, i + 1, converged=i + 1 == self.n_iterations)
+            for products, _ in enumerate(problem.settle_norm(), 1):  # finds |A|; can be cancelled meanwhile
+                yield Iterate(x, 0, products=products)
+            for i in range(1, self.n_iterations + 1):
+                step = problem.adjoint(problem.data - problem.forward(x)) / (problem.norm**2 or 1)
+                x = x + step
+                still = bool(np.linalg.norm(step) <= 1e-4 * np.linalg.norm(x))
+                reason = "raise n_iterations" if i == self.n_iterations and not still else ""
+                yield Iterate(x, i, products=problem.norm_products + i, converged=still, reason=reason)
+                if still:
+                    return
     """
 
 

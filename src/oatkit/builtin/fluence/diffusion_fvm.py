@@ -27,8 +27,9 @@ class DiffusionFvm(ThroughWater):
 
     A = (1 + R_eff) / (1 - R_eff) comes from the refractive indices. Fluence is relative: g is the attenuation in the
     water, so that a body without absorption under unattenuated light has Phi = 1. In absolute units
-    g = 4 J_t / (1 - R_eff), with J_t the irradiance transmitted into the body. ``illumination = "collimated"`` brings
-    the same power, g / (2 A) per area of wall, in a source buried at 1 / mu_s' under a wall with g = 0.
+    g = 4 J_t / (1 - R_phi), with J_t the irradiance transmitted into the body and R_phi as in
+    `oatkit.builtin.fluence.fresnel`. ``illumination = "collimated"`` brings what the wall lets in where Phi = 0,
+    g / (2 A) per area of it, in a source buried at 1 / mu_s' under a wall with g = 0.
 
     The wall cuts pixels where the signed distance says. The error falls with the square of the pixel once that is below
     the free path 1 / (mu_a + mu_s'); where D jumps between pixels, with the pixel. At the edge of the grid no light
