@@ -29,6 +29,6 @@ def install(target: Path, name: str, module: str, version: str = "1.0") -> Path:
 
 def run_oatkit(*arguments: str, path: Path | None = None, **options) -> subprocess.CompletedProcess[str]:
     """Run the command line as a process of its own, with the packages installed in `path` visible to it."""
-    environment = dict(os.environ) | ({"PYTHONPATH": str(path)} if path else {})
+    environment = options.pop("env", None) or dict(os.environ) | ({"PYTHONPATH": str(path)} if path else {})
     command = [sys.executable, "-c", "from oatkit.cli import main; main()", *arguments]
     return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=200, **options)

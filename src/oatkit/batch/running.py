@@ -1,19 +1,20 @@
-"""Many frames through one pipeline, streamed into a result on disk."""
+"""One run over many frames: what is to be done, who does it, and what goes into the result."""
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from oatkit.batch.engines import Engine, engine_named
+from oatkit.batch.pieces import Outcome, Work
 from oatkit.data import Scan
-from oatkit.engine import run_resolved
 from oatkit.errors import OatkitError, ResultError, ValidationError
 from oatkit.events import Listener, ignore
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.plain import decode, encode
 from oatkit.provenance import versions
-from oatkit.reconstruction import frame_key
 from oatkit.result import Result
 from oatkit.rules import Resolved, motion_in, resolve
 from oatkit.store import StoreWriter, load
@@ -28,6 +29,7 @@ def run_frames(
     on_frame: Callable[[int], None] = lambda frame: None,
     overwrite: bool = False,
     resume: bool = False,
+    engine: str | Engine = "serial",
 ) -> Result:
     """Run `pipeline` over `frames` (all unless said) and return the result that now lies in the folder `path`.
 
@@ -38,6 +40,9 @@ def run_frames(
     A run that is interrupted, by whatever, leaves the frames that were done in a hidden folder; the same call with
     `resume` goes on with them and ends in the result that an uninterrupted run gives, bit by bit. Where there is
     nothing to go on with it starts; where the result is complete already it is returned.
+
+    `engine` says who runs the frames (see `oatkit.batch.engine_named`); the result is the same, bit by bit, and a run
+    may go on with another engine. Events of frames are told by ``"serial"`` alone.
 
     Raises `ValidationError` for a frame that does not exist, where all are left out, and where the interrupted run was
     another one; `ResultError` where the result cannot be written; and the frame's own error where every frame failed;
@@ -55,31 +60,35 @@ def run_frames(
     run = _identity(pipeline, scan, chosen)
     if resume and not overwrite and (complete := _complete(Path(path), run)):
         return complete
+    by = engine_named(engine) if isinstance(engine, str) else engine
     with StoreWriter(path, len(chosen), scan.source, overwrite, run, resume) as writer:
-        todo = [(index, frame) for index, frame in enumerate(chosen) if index not in writer.done]
         for index in writer.done:
             on_frame(chosen[index])
-        if pipeline.scan.rules == "scan" and todo:
+        places = {frame: index for index, frame in enumerate(chosen) if index not in writer.done}
+        if places:
             resolved = _resolved(pipeline, scan, writer.common, memo, on_event)
-            resolved = replace(resolved, left_out=left_out)
-        first_failure, failed = None, 0
-        for index, frame in todo:
-            try:
-                if pipeline.scan.rules == "frame":
-                    resolved = replace(resolve(pipeline, scan, memo, on_event, frame), left_out=left_out)
-                result = run_resolved(resolved, scan, frame, memo, on_event)
-            except OatkitError as error:
-                # Only one is held: with it go the images that were in the making.
-                first_failure, failed = first_failure or error, failed + 1
-                writer.fail(index, f"frame {frame}: {error}")
-            else:
-                writer.write(index, result)
-            # No other frame needs what was made of this one; without this, memory grows with the scan.
-            memo.forget(*frame_key(scan, frame))
-            on_frame(frame)
-        if first_failure and failed == len(chosen):
-            raise first_failure
+            work = Work(replace(resolved, left_out=left_out), scan)
+            with closing(by.run(work, list(places), memo, on_event)) as outcomes:
+                first_failure = _write(writer, outcomes, places, on_frame)
+            if first_failure and not writer.written:
+                raise first_failure
     return load(path)
+
+
+def _write(
+    writer: StoreWriter, outcomes: Iterable[Outcome], places: Mapping[int, int], on_frame: Callable[[int], None]
+) -> OatkitError | None:
+    """Write what becomes of each frame, and return the first failure."""
+    first: OatkitError | None = None
+    for outcome in outcomes:
+        index = places[outcome.frame]
+        if outcome.result is None:
+            first = first or outcome.error
+            writer.fail(index, f"frame {outcome.frame}: {outcome.error}")
+        else:
+            writer.write(index, outcome.result)
+        on_frame(outcome.frame)
+    return first
 
 
 def _identity(pipeline: Pipeline, scan: Scan, chosen: list[int]) -> dict[str, Any]:
@@ -106,7 +115,12 @@ def _complete(path: Path, run: Mapping[str, Any]) -> Result | None:
 
 
 def _resolved(pipeline: Pipeline, scan: Scan, common: Mapping[str, Any], memo: Memo, on_event: Listener) -> Resolved:
-    """Return the pipeline with its rules replaced: as an interrupted run has done it, or anew."""
+    """Return the pipeline with its rules replaced: as an interrupted run has done it, or anew.
+
+    Where each frame has rules of its own nothing is replaced here.
+    """
+    if pipeline.scan.rules == "frame":
+        return Resolved(pipeline, pipeline)
     if not common:
         return resolve(pipeline, scan, memo, on_event)
     ran = Pipeline.of_table(common["pipeline"])

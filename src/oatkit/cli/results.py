@@ -46,6 +46,20 @@ def report(
 
 
 @command
+def join(
+    results: Annotated[list[Path], typer.Argument(metavar="PART.zarr ...", help="Results of the shards of one run.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.zarr", help="The folder to write.")],
+    overwrite: Overwrite = False,
+) -> None:
+    """Join results of parts of one run (`oatkit run --shard I/N`) into one, in the order of their frames."""
+    from oatkit.batch import join as joined
+
+    check_new(output, overwrite)
+    whole = joined(results, output, overwrite)
+    typer.echo(f"wrote {output}: {whole.frames} frames")
+
+
+@command
 def verify(result: ResultPath) -> None:
     """Check that a result is complete and that no bit of it has changed."""
     from oatkit.store import verify as problems_of

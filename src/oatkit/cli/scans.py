@@ -47,9 +47,24 @@ def run(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with a run that was interrupted; start where there was none.")
     ] = False,
+    engine: Annotated[
+        str, typer.Option(metavar="NAME", help="Who runs the frames: serial, processes or dask.")
+    ] = "serial",
+    workers: Annotated[
+        int | None, typer.Option(help="How many, for processes and dask; else one for each core.")
+    ] = None,
+    scheduler: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Of a dask cluster; else one is started on this machine.")
+    ] = "",
+    shard: Annotated[
+        str,
+        typer.Option(
+            metavar="I/N", help="Run only every N-th frame, from the I-th: for job arrays. See `oatkit join`."
+        ),
+    ] = "",
 ) -> None:
     """Run a pipeline over a scan and write the images, with how they came about, to a folder."""
-    from oatkit.batch import run_frames
+    from oatkit.batch import engine_named, run_frames, shard_of
     from oatkit.pipeline import Pipeline
     from oatkit.progress import ProgressBar
     from oatkit.reading import read
@@ -59,10 +74,12 @@ def run(
     loaded = Pipeline.load(pipeline, changes)
     found = read(scan)
     chosen = frames_in(frames, found.frames)
+    chosen = shard_of(chosen, shard) if shard else chosen
+    by = engine_named(engine, workers, scheduler)
     check_new(output, overwrite or resume)
     with ProgressBar(len(chosen)) as bar:
         result = run_frames(
-            loaded, found, output, chosen, bar.show, lambda frame: bar.next_frame(), overwrite=overwrite, resume=resume
+            loaded, found, output, chosen, bar.show, lambda _: bar.next_frame(), overwrite, resume=resume, engine=by
         )
     for line in summary(result):
         typer.echo(line)

@@ -84,6 +84,11 @@ class StoreWriter:
         return {int(index) for index in (*self._records, *self._failed)}
 
     @property
+    def written(self) -> int:
+        """How many frames have images."""
+        return len(self._records)
+
+    @property
     def common(self) -> Mapping[str, Any]:
         """What all frames have in common: ``pipeline`` as run, choices, ...; empty before the first is written."""
         return decode(self._common)
@@ -211,6 +216,16 @@ class StoreWriter:
         keys = BY_FRAME if _rules_by_frame(result) else ()
         return {key: own for key in keys if (own := encode(getattr(result, key))) != self._common[key]}
 
+    def _begin_with_the_first(self) -> None:
+        """Let what frames have in common be what the first one has, in whatever order they came."""
+        first = self._records[min(self._records, key=int)].own
+        common = {**self._common, **{key: encode(value) for key, value in first.items()}}
+        for index, record in self._records.items() if first else ():
+            mine = {**{key: self._common[key] for key in first}, **{k: encode(v) for k, v in record.own.items()}}
+            own = {key: value for key, value in mine.items() if value != common[key]}
+            self._records[index] = record.model_copy(update={"own": decode(own)})
+        self._common = common
+
     def _seal(self, name: str) -> None:
         """Bring a file to the disk and note its checksum."""
         sync(self._folder / name)
@@ -224,6 +239,7 @@ class StoreWriter:
             )
         if not self._records:
             raise ResultError(f"{self.path}: no frame gave an image; frame 0: {self._failed['0']}")
+        self._begin_with_the_first()
         manifest = Manifest(
             frames=self.frames,
             images=self._images,

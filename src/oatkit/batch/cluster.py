@@ -1,0 +1,97 @@
+"""Frames on a dask cluster: of this machine, or of any scheduler that has an address."""
+
+import pickle
+from collections.abc import Iterator, Sequence
+from typing import Any
+from uuid import uuid4
+
+from oatkit.batch.engines import IN_FLIGHT, Engine, Outcomes
+from oatkit.batch.pieces import Outcome, Work, run_piece
+from oatkit.errors import SolverError, ValidationError
+from oatkit.events import Listener
+from oatkit.memo import Memo
+from oatkit.threads import thread_count
+
+DEATHS = 2
+"""Of workers that one frame may cost."""
+
+
+class Dask(Engine):
+    """Any cluster that `distributed.Client` reaches; without an address, a `LocalCluster`.
+
+    A frame whose worker dies is run again by another; one that has cost `DEATHS` workers has failed. Workers must have
+    oatkit, the plugins of the pipeline, and see the scan under the same path.
+    """
+
+    def __init__(self, address: str = "", workers: int | None = None) -> None:
+        try:
+            import distributed  # noqa: F401
+        except ImportError as error:
+            raise ValidationError(
+                f'the engine "dask" needs dask and distributed: pip install "oatkit[scale]" ({error})'
+            ) from None
+        self.address, self.workers = address, workers or thread_count()
+
+    def run(self, work: Work, frames: Sequence[int], memo: Memo, on_event: Listener) -> Outcomes:
+        """Yield outcomes as they come."""
+        import dask
+        from distributed import Client
+
+        settings = {
+            "distributed.scheduler.allowed-failures": DEATHS - 1,
+            "distributed.scheduler.work-stealing": False,
+        }
+        with dask.config.set(settings):
+            given: Any = {"address": self.address} if self.address else self._local()
+            with Client(**given, set_as_default=False) as client:
+                yield from self._run(client, work, frames)
+
+    def _local(self) -> dict[str, Any]:
+        return {"n_workers": self.workers, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+
+    def _run(self, client: Any, work: Work, frames: Sequence[int]) -> Iterator[Outcome]:
+        from distributed import as_completed
+
+        # Not scattered: what is scattered is lost with the last worker that has it.
+        shared, run = pickle.dumps(work), uuid4().hex
+        queue = iter(frames)
+        most = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+        waiting: dict[Any, int] = {}
+
+        def submit() -> Any:
+            frame = next(queue, None)
+            if frame is None:
+                return None
+            future = client.submit(_work, run, shared, frame, pure=False)
+            waiting[future] = frame
+            return future
+
+        first = [future for _ in range(most) if (future := submit()) is not None]
+        coming = as_completed(first, loop=client.loop)
+        for future in coming:
+            yield _outcome(future, waiting.pop(future))
+            future.release()
+            if (another := submit()) is not None:
+                coming.add(another)
+
+
+def _outcome(future: Any, frame: int) -> Outcome:
+    from distributed import KilledWorker
+
+    try:
+        return future.result()
+    except KilledWorker:
+        return Outcome(
+            frame, error=SolverError(f"{DEATHS} workers that ran it died; it may need more memory than there is")
+        )
+
+
+_kept: dict[str, tuple[Work, Memo]] = {}
+"""Of a worker: the work of the run that it is at, and the operator, which it holds from frame to frame."""
+
+
+def _work(run: str, work: bytes, frame: int) -> Outcome:
+    if run not in _kept:
+        _kept.clear()
+        _kept[run] = pickle.loads(work), Memo()
+    return run_piece(_kept[run][0], frame, _kept[run][1])
