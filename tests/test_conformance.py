@@ -38,6 +38,7 @@ def outline(tmp_path):
     return {
         "polygon": {"vertices": tuple(map(tuple, corners.tolist()))},
         "mask": {"path": tmp_path / "mask.npy"},
+        "monte-carlo": {"n_photons": 30_000},  # enough, and quick
     }
 
 

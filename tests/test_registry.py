@@ -236,7 +236,9 @@ def test_plugins_that_crash_or_hang_are_found_from_outside(packages, tmp_path, m
     install(site, "oatkit-good", GOOD.format(name="landweber"), "2.5")
     for name, (module, _) in VIOLENT.items():
         install(site, name, module)
+    monkeypatch.setenv("OATKIT_PLUGINS", ",".join(VIOLENT))
     done = run_oatkit("plugins", "--check", "all", "--seconds", "3", path=site)
+    monkeypatch.delenv("OATKIT_PLUGINS")
     assert done.returncode == 2
     assert done.stderr == "oatkit: not all plugins can be used: oatkit-crash, oatkit-exit, oatkit-hang\n"
     for name, (_, words) in VIOLENT.items():

@@ -12,7 +12,7 @@ from typing import Any
 
 from oatkit.errors import ValidationError
 from oatkit.names import did_you_mean
-from oatkit.registry import ALLOWED, OURS, distributions
+from oatkit.registry import ALLOWED, OURS, allowed, distributions
 
 LOADING = """
 import json, sys
@@ -63,13 +63,13 @@ class Trial:
 
 
 def distributions_of(name: str) -> list[str]:
-    """Return the distributions that `name` stands for: one of them, or ``all`` but ours.
+    """Return the distributions that `name` stands for: one of them, or ``all`` that may be loaded but ours.
 
     Raises `ValidationError` where there is none; nothing of theirs is loaded to find out.
     """
     known = distributions()
     if name == "all":
-        return [one for one in known if one != OURS]
+        return [one for one in known if one != OURS and allowed(one)]
     if name not in known:
         raise ValidationError(f"no distribution named '{name}' declares plugins{did_you_mean(name, known)}")
     return [name]

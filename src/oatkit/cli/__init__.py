@@ -9,7 +9,7 @@ import signal
 
 # Each registers its commands, which --help lists in this order.
 # isort: off
-from oatkit.cli import showcase, scans, results, regions, series, windows, catalogue  # noqa: F401
+from oatkit.cli import showcase, scans, results, regions, series, windows, catalogue, authoring  # noqa: F401
 
 # isort: on
 from oatkit.cli.app import Complaints, app, interrupt, terminate

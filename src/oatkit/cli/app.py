@@ -109,7 +109,7 @@ def command(function: Command) -> Command:
             complain(str(error))
             raise typer.Exit(1) from None
 
-    return app.command(name=function.__name__.removesuffix("_"))(guarded)
+    return app.command(name=function.__name__.removesuffix("_").replace("_", "-"))(guarded)
 
 
 def complain(text: str) -> None:

@@ -1,0 +1,1 @@
+"""Solvers and penalties of PyLops and PyProximal, for oatkit."""
