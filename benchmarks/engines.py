@@ -14,29 +14,13 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
-
 import oatkit
+from faults import same, write
 from oatkit.batch import engine_named, run_frames
-from oatkit.scanfile import write_scan
-from oatkit.simulate import arc_detectors, disc, simulate_scan
 from operators import cpu_model
 
 CHANGES = ("grid.pixels=100", "grid.field_of_view_mm=9", "reconstruct.n_iterations=20")
 WORKERS = 2
-
-
-def write(path: Path, frames: int) -> oatkit.Scan:
-    """Write frames that all differ, and open them."""
-    geometry = oatkit.Geometry(arc_detectors(64, 0.015, 270), 20e6, 400, start_time_s=2e-6, speed_of_sound_m_s=1500)
-    arc = oatkit.plugin("forward_model", "arc")()
-    scan = simulate_scan(
-        lambda grid: disc(grid, radius_m=3e-3), arc, geometry=geometry, field_of_view_m=10e-3, pixels=91, frames=2
-    )
-    signals = np.asarray(scan.signals)[:1] * np.linspace(1, 2, frames)[:, None, None, None]
-    valid = np.repeat(np.asarray(scan.valid)[:1], frames, axis=0)
-    write_scan(oatkit.Scan(signals, scan.geometry, scan.wavelengths_nm, valid, name="engines"), path)
-    return oatkit.read(path)
 
 
 def timed(scan: oatkit.Scan, output: Path, engine: str, kill: bool = False) -> tuple[float, float, float]:
@@ -62,18 +46,12 @@ def worker() -> int:
     return max(children)
 
 
-def same(first: Path, second: Path) -> bool:
-    """Say whether all images are equal, bit by bit, and both results are complete."""
-    names = [path.relative_to(first) for path in first.glob("*/c/**/*") if path.is_file()]
-    return all((first / n).read_bytes() == (second / n).read_bytes() for n in names) and not oatkit.verify(second)
-
-
 def main(frames: int) -> None:
     """Run all, print."""
     print(f"{cpu_model()}, {os.cpu_count()} cores; {frames} frames, {WORKERS} workers with one thread each")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        scan = write(folder / "scan.h5", frames)
+        scan = oatkit.read(write(folder / "scan.h5", frames))
         for engine, kill in (("serial", False), ("processes", False), ("dask", False), ("dask", True)):
             output = folder / f"{engine}-{kill}.zarr"
             first, rest, own = timed(scan, output, engine, kill)

@@ -36,6 +36,14 @@ class Rogue(Solver):
             image = image[1:]
         if self.what == "raises":
             raise SolverError("no luck today")
+        if self.what == "exits":
+            raise SystemExit(3)
+        if self.what == "mutates":
+            problem.data[0] = 7
+        if self.what == "type":
+            yield "an image"  # type: ignore[misc]
+        if self.what == "inside":
+            image = "zeros"  # type: ignore[assignment]
         if self.what != "nothing":
             yield Iterate(image, 1)
 
@@ -142,6 +150,10 @@ def test_a_run_can_be_left_at_any_iterate(small_scan):
         ("shape", PluginError, r"solver 'rogue' returned an image of shape \(31, 32\)"),
         ("nothing", PluginError, "solver 'rogue' ended without yielding an image"),
         ("raises", SolverError, "no luck today"),
+        ("exits", PluginError, "solver 'rogue' failed: SystemExit: 3"),
+        ("mutates", PluginError, "solver 'rogue' failed: ValueError: assignment destination is read-only"),
+        ("type", PluginError, "solver 'rogue' yielded a str, not an Iterate"),
+        ("inside", PluginError, "solver 'rogue' returned an image of"),
     ],
 )
 def test_what_a_plugin_returns_is_checked(small_scan, what, error, sentence):

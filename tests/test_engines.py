@@ -2,15 +2,13 @@
 
 import os
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import oatkit
+from many_frames import same, write_frames_of
 from oatkit import Pipeline, ValidationError
 from oatkit.batch import engine_named, join, run_frames, shard_of
-from oatkit.scanfile import write_scan
 from oatkit.store import load, verify
 from packages import install, run_oatkit
 
@@ -21,11 +19,7 @@ CHANGES = ("grid.pixels=32", "grid.field_of_view_mm=9", "reconstruct.n_iteration
 @pytest.fixture(scope="module")
 def scan(small_scan, tmp_path_factory):
     """Seven different frames in a file."""
-    path = tmp_path_factory.mktemp("engines") / "seven.h5"
-    signals = np.asarray(small_scan.signals)[:1] * np.linspace(1, 2, FRAMES)[:, None, None, None]
-    valid = np.repeat(np.asarray(small_scan.valid)[:1], FRAMES, axis=0)
-    write_scan(oatkit.Scan(signals, small_scan.geometry, small_scan.wavelengths_nm, valid, name="seven"), path)
-    return oatkit.read(path)
+    return write_frames_of(small_scan, FRAMES, tmp_path_factory.mktemp("engines") / "seven.h5")
 
 
 @pytest.fixture(scope="module")
@@ -38,15 +32,6 @@ def pipeline():
 def whole(scan, pipeline, tmp_path_factory):
     """The result of one process."""
     return run_frames(pipeline, scan, tmp_path_factory.mktemp("whole") / "out.zarr").stored.path
-
-
-def same(first: Path, second: Path) -> bool:
-    """Say whether two results have the same images, to the last bit, in one order, and the same pipeline as run."""
-    one, other = load(first), load(second)
-    frames = [(result.frames, result.pipeline, [result.when(i)[0] for i in range(FRAMES)]) for result in (one, other)]
-    chunks = [path.relative_to(first) for path in first.glob("*/c/**/*") if path.is_file()]
-    equal = all((first / name).read_bytes() == (second / name).read_bytes() for name in chunks)
-    return frames[0] == frames[1] and len(chunks) == FRAMES and equal and verify(second) == []
 
 
 @pytest.mark.parametrize("name", ["processes", "dask"])

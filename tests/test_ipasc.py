@@ -113,7 +113,7 @@ def test_a_record_too_long_for_any_chunk_is_refused(tmp_path):
 
 def test_more_detectors_than_are_read_are_not_written(tmp_path):
     """The limit of the reader is the writer's."""
-    geometry = Geometry(Detectors(np.zeros((65_537, 2))), 40e6, 1)
+    geometry = Geometry(Detectors(np.full((65_537, 2), 0.04)), 40e6, 1)
     with pytest.raises(ValidationError, match="65536 detectors"):
         write_ipasc(Scan(np.ones((1, 1, 65_537, 1), "u1"), geometry, (700,)), tmp_path / "scan.hdf5")
 

@@ -235,7 +235,7 @@ def test_a_full_disk_is_seen_before_writing(tmp_path, monkeypatch):
 
 def test_long_records_are_split_into_chunks_that_can_be_read(tmp_path):
     """A pulse of more than the reader's limit for a chunk is written in several."""
-    geometry = Geometry(Detectors(np.zeros((20, 2))), 40e6, 1_000_000)
+    geometry = Geometry(Detectors(np.full((20, 2), 0.04)), 40e6, 1_000_000)
     write_scan(Scan(np.ones((1, 1, 20, 1_000_000), "f4"), geometry, (700,)), tmp_path / "scan.h5")
     assert OatkitHdf5().read(tmp_path / "scan.h5").signals[0, 0, 19, -1] == 1
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import oatkit
+from many_frames import same, write_frames_of
 from oatkit import Pipeline, ResultError, ValidationError
 from oatkit.batch import run_frames
 from oatkit.events import StepStarted
-from oatkit.scanfile import write_scan
 from oatkit.store import load, verify
 from packages import run_oatkit
 
@@ -26,14 +26,7 @@ CHANGES = ("grid.pixels=32", "grid.field_of_view_mm=9", "reconstruct.n_iteration
 @pytest.fixture(scope="module")
 def scan(small_scan, tmp_path_factory):
     """Six different frames in a file."""
-    path = tmp_path_factory.mktemp("resume") / "six.h5"
-    signals = np.asarray(small_scan.signals)[:1] * np.linspace(1, 2, FRAMES)[:, None, None, None]
-    valid = np.repeat(np.asarray(small_scan.valid)[:1], FRAMES, axis=0)
-    write_scan(
-        oatkit.Scan(signals, small_scan.geometry, small_scan.wavelengths_nm, valid, name="six"),
-        path,
-    )
-    return oatkit.read(path)
+    return write_frames_of(small_scan, FRAMES, tmp_path_factory.mktemp("resume") / "six.h5")
 
 
 @pytest.fixture(scope="module")
@@ -46,15 +39,6 @@ def pipeline():
 def whole(scan, pipeline, tmp_path_factory):
     """The result of an uninterrupted run."""
     return run_frames(pipeline, scan, tmp_path_factory.mktemp("whole") / "out.zarr").stored.path
-
-
-def same(first: Path, second: Path) -> bool:
-    """Say whether two results have the same images, to the last bit, and the same pipeline as run."""
-    one, other = load(first), load(second)
-    if (one.frames, one.pipeline, dict(one.failed)) != (other.frames, other.pipeline, dict(other.failed)):
-        return False
-    chunks = [path.relative_to(first) for path in first.glob("*/c/**/*") if path.is_file()]
-    return bool(chunks) and all((first / name).read_bytes() == (second / name).read_bytes() for name in chunks)
 
 
 def interrupted(pipeline, scan, path, frames_done, **options):
@@ -171,15 +155,15 @@ def test_a_torn_diary_costs_frames_and_nothing_else(scan, pipeline, whole, tmp_p
 
 def test_a_frame_that_failed_has_failed_for_good(scan, pipeline, tmp_path, monkeypatch):
     """The reason of a frame that failed before the interruption is in the result."""
-    from oatkit import batch
+    from oatkit.batch import pieces
 
     def run_resolved(resolved, scan, frame, *more):
         if frame == 1:
             raise oatkit.SolverError("the light was off")
         return original(resolved, scan, frame, *more)
 
-    original = batch.run_resolved
-    monkeypatch.setattr(batch, "run_resolved", run_resolved)
+    original = pieces.run_resolved
+    monkeypatch.setattr(pieces, "run_resolved", run_resolved)
     interrupted(pipeline, scan, tmp_path / "out.zarr", 3)
     monkeypatch.undo()
     result = run_frames(pipeline, scan, tmp_path / "out.zarr", resume=True)

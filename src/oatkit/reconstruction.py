@@ -67,6 +67,8 @@ def reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iter
         with blame(solver):
             for state in solver.iterate(problem):
                 checkpoint()
+                if not isinstance(state, Iterate):
+                    raise PluginError(f"solver '{solver.name}' yielded a {type(state).__name__}, not an Iterate")
                 yield StepIterate("reconstruct", wavelength, state)
         last.append(_checked_iterate(solver, state, problem))
         norms.append(norm(problem.data))

@@ -24,7 +24,7 @@ from oatkit.scale import remember_norm
 from oatkit.weights import with_weight
 
 PIXELS = 64
-BUDGET_S = 0.09
+BUDGET_S = 0.06
 """From the data to the first picture, whatever the solver."""
 REST_S = 1.0
 """How long a picture is made better while nothing moves."""
