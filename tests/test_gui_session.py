@@ -10,6 +10,7 @@ from oatkit.errors import SolverError, ValidationError
 from oatkit.events import StepDone
 from oatkit.gui.job import Job
 from oatkit.gui.session import Converging, Finished, Session
+from oatkit.gui.warming import warm_up
 
 
 def finished(job):
@@ -106,3 +107,10 @@ def test_the_absorption_is_calibrated_by_an_unmixer_that_is_not_run(small_scan):
     assert "absorption" in images
     assert "residual" not in images
     assert any("the spectra tell no calibration" in note for note in images.warnings)
+
+
+def test_warming_up_ends_well():
+    """What the window compiles beside itself runs to its end, so that nothing is left to compile for the first scan."""
+    job = warm_up()
+    assert job.wait(120)
+    assert job.failure is None

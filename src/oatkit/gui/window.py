@@ -4,10 +4,14 @@ from pathlib import Path
 
 import napari
 from npe2 import PluginManager
+from qtpy.QtCore import QTimer
 
 from oatkit.gui.opening import open_path
+from oatkit.gui.warming import warm_up
 from oatkit.gui.workbench import workbench
 
+AT_REST_MS = 500
+"""After which a window has been drawn."""
 NAME = "oatkit"
 """Of the plugin, as napari knows it."""
 
@@ -30,6 +34,7 @@ def make_window(file: Path | None = None, show: bool = True) -> napari.Viewer:
         raise
     if show:
         viewer.show()
+        QTimer.singleShot(AT_REST_MS, warm_up)
     return viewer
 
 
