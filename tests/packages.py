@@ -6,6 +6,13 @@ import sys
 import zipfile
 from pathlib import Path
 
+from oatkit.registry import OURS, installed
+
+
+def built_in(kind: str) -> list[type]:
+    """The plugins of a kind that ship with oatkit, whatever else is installed."""
+    return [e.cls for e in installed().entries if e.distribution == OURS and e.kind == kind]
+
 
 def install(target: Path, name: str, module: str, version: str = "1.0") -> Path:
     """Install a one-module distribution with an entry point of the group ``oatkit`` into the folder `target`."""

@@ -15,11 +15,11 @@ HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg",
 
 ORDER = [
     {"checkpoint", "compiled", "errors", "laplacian", "names", "vectors"},
-    {"content", "atomic", "threads", "plain", "page", "hostile"},
-    {"csv_cell", "data", "plot"},
+    {"content", "atomic", "threads", "plain", "page", "hdf5_heaps"},
+    {"hostile", "data", "plot"},
     {
-        "parameters", "checked", "label_files", "light", "metrics", "polygons", "scale", "scanfile",
-        "spectra", "wavelengths", "words",
+        "parameters", "checked", "csv_cell", "label_files", "light", "metrics", "polygons", "scale", "scanfile",
+        "slips", "spectra", "wavelengths", "words",
     },
     {"problem", "ipasc", "masking", "outlines", "shapes", "tables"},
     {"api"},

@@ -10,12 +10,12 @@ from scipy.special import lambertw
 from oatkit.api import Proximable, Quadratic, Smooth
 from oatkit.builtin.regularizers.entropy import Entropy, log_prox
 from oatkit.builtin.regularizers.identity import Identity
-from oatkit.registry import installed
+from packages import built_in
 
 RNG = np.random.default_rng(0)
 IMAGE = RNG.uniform(0.1, 3.0, (5, 7))
-INSTALLED = [cls() for cls in installed().of_kind("regularizer")]
-SMOOTH, PROXIMABLE, QUADRATIC = ([r for r in INSTALLED if isinstance(r, a)] for a in (Smooth, Proximable, Quadratic))
+OURS = [cls() for cls in built_in("regularizer")]
+SMOOTH, PROXIMABLE, QUADRATIC = ([r for r in OURS if isinstance(r, a)] for a in (Smooth, Proximable, Quadratic))
 
 
 def named(regularizer):
@@ -67,7 +67,7 @@ def test_quadratic_is_the_squared_norm_of_its_operator(regularizer):
     assert applied @ other == pytest.approx(IMAGE.ravel() @ operator.rmatvec(other), abs=1e-12)
 
 
-@pytest.mark.parametrize("regularizer", INSTALLED, ids=named)
+@pytest.mark.parametrize("regularizer", OURS, ids=named)
 @given(st.floats(1e-3, 1e3))
 def test_degree_says_how_the_penalty_grows(regularizer, factor):
     """value(k x) = k^degree value(x), the prior of the entropy growing along."""

@@ -1,4 +1,4 @@
-"""What every installed solver keeps to, and the least-squares solvers against direct and independent solutions."""
+"""What each of our solvers keeps to, and the least-squares solvers against direct and independent solutions."""
 
 import copy
 import pickle
@@ -20,12 +20,12 @@ from oatkit.builtin.solvers.lsqr_threshold import LsqrThreshold
 from oatkit.builtin.solvers.nnls import Nnls
 from oatkit.errors import SolverError, ValidationError
 from oatkit.masking import without_rows
-from oatkit.registry import installed
+from packages import built_in
 from small_problems import PROBLEMS, Counting, blurred, circles, dense, noise_like, scaled, too_few_data
 
-INSTALLED = installed().of_kind("solver")
+OURS = built_in("solver")
 QUADRATIC = [Lsqr, LsqrThreshold, Nnls]
-WEIGHTED = [cls for cls in INSTALLED if "weight" in cls.model_fields]
+WEIGHTED = [cls for cls in OURS if "weight" in cls.model_fields]
 
 
 def placed(problem):
@@ -45,7 +45,7 @@ def named(cls):
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+@pytest.mark.parametrize("cls", OURS, ids=named)
 def test_every_solver_yields_finite_images_and_an_honest_end(cls, name):
     """All images are finite, of the problem's shape and left alone afterwards; the last one alone says why it ended."""
     problem = placed(PROBLEMS[name]())
@@ -62,7 +62,7 @@ def test_every_solver_yields_finite_images_and_an_honest_end(cls, name):
         assert states[-1].residual_norm == pytest.approx(np.linalg.norm(misfit), rel=1e-6)
 
 
-@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+@pytest.mark.parametrize("cls", OURS, ids=named)
 def test_every_solver_is_deterministic(cls):
     """Two runs give the same image to the last bit, after pickling too."""
     problem = placed(circles())
@@ -71,7 +71,7 @@ def test_every_solver_is_deterministic(cls):
     np.testing.assert_array_equal(first, again)
 
 
-@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+@pytest.mark.parametrize("cls", OURS, ids=named)
 def test_every_solver_can_be_cancelled_between_products(cls):
     """No more than two applications of the operator or its adjoint, each way, lie between two iterates."""
     problem = placed(circles())
@@ -87,7 +87,7 @@ def test_every_solver_can_be_cancelled_between_products(cls):
 
 @pytest.mark.parametrize("scaling", ["relative", "absolute"])
 @pytest.mark.parametrize("make", [circles, too_few_data])
-@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+@pytest.mark.parametrize("cls", OURS, ids=named)
 def test_products_count_every_application(cls, make, scaling):
     """Products are the calls of the operator and of its adjoint, the setting of the scale included, give or take one;
     with the scale known from another problem they are said to be the same.
@@ -109,7 +109,7 @@ def test_norm_is_sought_only_where_it_is_used(cls):
     assert first.iteration == (0 if cls is Nnls else 1)
 
 
-@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+@pytest.mark.parametrize("cls", OURS, ids=named)
 def test_every_solver_gives_zero_for_zero_data(cls):
     """No signal, no image: zero, converged, and said."""
     problem = circles()
@@ -119,7 +119,7 @@ def test_every_solver_gives_zero_for_zero_data(cls):
     assert "zero" in last.reason
 
 
-@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+@pytest.mark.parametrize("cls", OURS, ids=named)
 def test_every_solver_follows_the_scale(cls):
     """With dimensionless weights A -> a A and b -> k b turn the image into k/a times itself."""
     one = cls().solve(placed(circles())).image
@@ -157,7 +157,7 @@ def test_no_convergence_is_claimed_where_numbers_are_too_small_to_square(cls):
     assert not last.converged or last.image == pytest.approx(flat, rel=0.05)
 
 
-@pytest.mark.parametrize("cls", INSTALLED, ids=named)
+@pytest.mark.parametrize("cls", OURS, ids=named)
 def test_faulty_operator_ends_in_a_sentence(cls):
     """An operator that returns NaN raises `SolverError`; no image with NaN comes out."""
     problem = placed(circles())
@@ -171,7 +171,7 @@ def test_faulty_operator_ends_in_a_sentence(cls):
         cls().solve(Problem(faulty, problem.data, problem.shape, problem.geometry, problem.grid))
 
 
-@pytest.mark.parametrize("cls", [cls for cls in INSTALLED if "n_iterations" in cls.model_fields], ids=named)
+@pytest.mark.parametrize("cls", [cls for cls in OURS if "n_iterations" in cls.model_fields], ids=named)
 def test_too_few_iterations_are_no_convergence(cls):
     """After a single step the solver says that it stopped, not that it converged, and what to do."""
     last = cls(n_iterations=1).solve(placed(circles()))

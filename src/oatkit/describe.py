@@ -15,6 +15,7 @@ from oatkit.focus import Focus
 from oatkit.motion import Motion
 from oatkit.parameters import Parameters, bounds_of, expected
 from oatkit.reading import read_images, read_regions
+from oatkit.slips import scan_notes
 from oatkit.wavelengths import wavelength_notes
 
 
@@ -102,7 +103,7 @@ def scan_table(scan: Scan, beside: Beside | None = None) -> dict[str, Any]:
         "fingerprint": scan.fingerprint,
         "images": [{"name": name, "frames": len(stored)} for name, stored in beside.images.items()],
         "regions": [region.name for region in beside.regions],
-        "notes": [*scan.notes, *wavelength_notes(scan.wavelengths_nm), *beside.notes],
+        "notes": [*scan.notes, *wavelength_notes(scan.wavelengths_nm), *scan_notes(scan), *beside.notes],
     }
 
 

@@ -4,6 +4,7 @@ Each refuses before it reads: sizes are compared with the limits below, HDF5 lin
 without being followed, and XML entities and document types are never expanded. What they raise is `ReadError`.
 """
 
+import struct
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from math import prod
@@ -12,6 +13,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 
 from oatkit.errors import OatkitError, ReadError
+from oatkit.hdf5_heaps import UNDEFINED, check_heap, check_heaps_of
 
 MAX_XML_BYTES = 64 * 2**20
 MAX_XML_DEPTH = 64
@@ -117,7 +119,16 @@ def open_hdf5(path: Path) -> Iterator[Any]:
             yield file
     except OatkitError:
         raise
-    except (OSError, RuntimeError, LookupError, ValueError, TypeError, MemoryError, ArithmeticError) as error:
+    except (
+        OSError,
+        RuntimeError,
+        LookupError,
+        ValueError,
+        TypeError,
+        MemoryError,
+        ArithmeticError,
+        struct.error,
+    ) as error:
         raise ReadError(f"{path}: not a complete HDF5 file, or damaged ({printable(str(error), 200)})") from None
 
 
@@ -219,11 +230,22 @@ def _wrong_heap(item: Any) -> str:
     offset = item.id.get_offset()
     if offset is None:
         return "" if item.id.get_storage_size() == 0 else "a text of variable length in chunks, which is not read"
-    # What is stored is a reference: the length in 4 bytes, then the address and the index in the heap.
+    # What is stored is a reference: the length in 4 bytes, then the address of the heap in 8, then the index in it.
     with open(item.file.filename, "rb") as file:
         file.seek(offset)
-        length = int.from_bytes(file.read(4), "little")
-    return f"a text of {length} bytes; at most {MAX_TEXT_BYTES} are read" if length > MAX_TEXT_BYTES else ""
+        length, address = struct.unpack("<IQ", file.read(12))
+    if length > MAX_TEXT_BYTES:
+        return f"a text of {length} bytes; at most {MAX_TEXT_BYTES} are read"
+    if address not in (0, UNDEFINED):
+        check_heap(item.file.filename, item.file.userblock_size + address)
+    return ""
+
+
+def check_attribute_heaps(item: Any) -> None:
+    """Raise `ReadError` where the texts of variable length among an object's attributes cannot be read safely."""
+    import h5py
+
+    check_heaps_of(item.file.filename, item.file.userblock_size, h5py.h5o.get_info(item.id).addr)
 
 
 def _wrong_type(item: Any, kinds: str, ndim: int | Collection[int]) -> str:

@@ -5,7 +5,8 @@ its version 1.10, the oldest that protects its own tables by checksums, with the
 fletcher32 checksum, uncompressed, little-endian::
 
     /about             JSON in UTF-8, one fixed-length string: name, source, reader, speed_of_sound_source, notes,
-                       sampling_rate_hz, start_time_s, speed_of_sound_m_s, wavelengths_nm, and, with a truth, under
+                       sampling_rate_hz, start_time_s, speed_of_sound_m_s, wavelengths_nm, under arrays the names of
+                       the optional datasets that are there, and, with a truth, under
                        truth its quantity, unit, pixel_size_m, centre_m and wavelengths_nm; those of further truths
                        under truth_images, by name
     /signals           (frame, wavelength, detector, sample), any real type; one chunk holds one pulse
@@ -195,6 +196,8 @@ def _about(scan: Scan, truths: Mapping[str, Image]) -> dict[str, Any]:
     about = {k: getattr(scan, k) for k in texts} | {k: getattr(scan.geometry, k) for k in numbers}
     described = {name: _description(image) for name, image in truths.items()}
     further = {name.removeprefix(f"{FURTHER}/"): described[name] for name in described if name != FIRST}
+    about["arrays"] = [name for name in PER_PULSE if getattr(scan, name) is not None]
+    about["arrays"] += [] if scan.geometry.impulse_response is None else ["impulse_response"]
     return about | {k: v for k, v in {FIRST: described.get(FIRST), FURTHER: further}.items() if v}
 
 

@@ -14,6 +14,7 @@ from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.quantification import following, quantify
 from oatkit.reconstruction import preprocess, raw_key, reconstruct
+from oatkit.slips import arrival_notes
 
 NUMBER = re.compile(r"[0-9.]+(e[+-]?[0-9]+)?")
 
@@ -29,7 +30,8 @@ def steps(pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = No
     yield StepStarted("preprocess")
     start = time.perf_counter()
     clean, grid = preprocess(pipeline, scan, frame, memo), pipeline.grid.grid()
-    yield StepDone("preprocess", time.perf_counter() - start, {}, clean.notes[len(scan.notes) :])
+    notes = (*clean.notes[len(scan.notes) :], *arrival_notes(clean, grid))
+    yield StepDone("preprocess", time.perf_counter() - start, {}, notes)
 
     chain = (*raw_key(pipeline, scan, frame), pipeline.grid, pipeline.forward, pipeline.reconstruct)
     images: dict[str, Image] = {}

@@ -8,6 +8,7 @@ import numpy as np
 
 from oatkit.data import Grid, Optics, Scan
 from oatkit.parameters import Parameters, param
+from oatkit.slips import scan_notes
 from oatkit.spectra import TISSUES, tissue_optics
 from oatkit.spectra.optics import read_optics
 from oatkit.wavelengths import choose_wavelengths, wavelength_notes
@@ -24,7 +25,11 @@ class ScanTable(Parameters):
         at_most=7000,
     )
     start_time_us: float | None = param(
-        None, "time of the first sample after the light pulse, in place of the file's", unit="us"
+        None,
+        "time of the first sample after the light pulse, in place of the file's",
+        unit="us",
+        at_least=-10_000,
+        at_most=10_000,
     )
     rules: Literal["scan", "frame"] = param(
         "scan",
@@ -47,12 +52,12 @@ class ScanTable(Parameters):
         """
         if self.wavelengths_nm:
             scan = choose_wavelengths(scan, self.wavelengths_nm)
-        scan = replace(scan, notes=(*scan.notes, *wavelength_notes(scan.wavelengths_nm)))
         if isinstance(self.speed_of_sound_m_s, float | int):
             scan = scan.with_speed_of_sound(self.speed_of_sound_m_s, "pipeline")
         if self.start_time_us is not None:
             scan = scan.with_start_time(self.start_time_us * 1e-6)
-        return scan
+        found = (*wavelength_notes(scan.wavelengths_nm), *scan_notes(scan))
+        return replace(scan, notes=(*scan.notes, *(note for note in found if note not in scan.notes)))
 
 
 class MotionTable(Parameters):
@@ -71,8 +76,10 @@ class GridTable(Parameters):
     """The table ``[grid]``: the square image to reconstruct."""
 
     pixels: int = param(200, "pixels along each side", at_least=2, at_most=8192)
-    field_of_view_mm: float = param(25.0, "length of each side", unit="mm", above=0)
-    centre_mm: tuple[float, float] = param((0.0, 0.0), "middle of the image, (y, x)", unit="mm")
+    field_of_view_mm: float = param(25.0, "length of each side", unit="mm", above=0, at_most=1000)
+    centre_mm: tuple[float, float] = param(
+        (0.0, 0.0), "middle of the image, (y, x)", unit="mm", at_least=-1000, at_most=1000
+    )
 
     def grid(self) -> Grid:
         """Return the grid in SI units. Raises `ValidationError` for pixels of an impossible size."""
@@ -91,8 +98,12 @@ class OpticsTable(Parameters):
         None,
         "CSV file in place of a preset, with the columns wavelength_nm, absorption_per_cm, reduced_scattering_per_cm",
     )
-    absorption_per_cm: float | None = param(None, "mu_a of the body at every wavelength", unit="1/cm", above=0)
-    reduced_scattering_per_cm: float | None = param(None, "mu_s' of the body at every wavelength", unit="1/cm", above=0)
+    absorption_per_cm: float | None = param(
+        None, "mu_a of the body at every wavelength", unit="1/cm", above=0, at_most=100_000
+    )
+    reduced_scattering_per_cm: float | None = param(
+        None, "mu_s' of the body at every wavelength", unit="1/cm", above=0, at_most=100_000
+    )
 
     def optics(self, wavelengths_nm: tuple[float, ...]) -> Optics:
         """Return the properties in SI units. Raises `ReadError` for the file and `ValidationError` out of its range."""

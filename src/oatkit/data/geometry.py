@@ -10,13 +10,16 @@ from oatkit.content import ByContent, check_range, read_only
 from oatkit.data.grid import Grid
 from oatkit.errors import ValidationError
 
+SMALLEST_ARRAY_M = 1e-3
+"""No array is smaller; positions in m that were converted from mm twice are."""
+
 
 @dataclass(frozen=True, eq=False)
 class Detectors(ByContent):
     """Point detectors in the image plane, anywhere and in any order.
 
-    Raises `ValidationError` where positions are not of shape ``(n, 2)``, not finite, or further than 2 m from the
-    origin. `from_xyz` takes points in the order in which most files hold them.
+    Raises `ValidationError` where positions are not of shape ``(n, 2)``, not finite, further than 2 m from the origin,
+    or all within 1 mm of it. `from_xyz` takes points in the order in which most files hold them.
     """
 
     positions_m: np.ndarray
@@ -30,6 +33,11 @@ class Detectors(ByContent):
                 "Detectors.from_xyz takes points of shape (n, 3) in the order (x, y, z)"
             )
         check_range("detector positions", positions, -2.0, 2.0, "the unit is m, so 40 mm is 0.04")
+        if len(positions) > 1 and not abs(positions).max() >= SMALLEST_ARRAY_M:
+            raise ValidationError(
+                f"detector positions: all lie within {1e3 * abs(positions).max():.3g} mm of the origin; the unit is m, "
+                "so 40 mm is 0.04"
+            )
         object.__setattr__(self, "positions_m", read_only(positions))
 
     @classmethod
@@ -80,7 +88,7 @@ class Geometry(ByContent):
             raise ValidationError(f"n_samples: must be a whole number, got {self.n_samples}")
         object.__setattr__(self, "n_samples", int(self.n_samples))
         check_range("start_time_s", self.start_time_s, -1e-2, 1e-2, "the unit is s, so 10 us is 1e-5")
-        check_range("speed_of_sound_m_s", self.speed_of_sound_m_s, 300, 7000, "the unit is m/s; water has about 1500")
+        check_range("speed_of_sound_m_s", self.speed_of_sound_m_s, 300, 7000, "the unit is m/s, so 1.5 km/s is 1500")
         if self.impulse_response is not None:
             response = np.asarray(self.impulse_response, dtype=float)
             if response.ndim != 1 or response.size == 0 or not np.isfinite(response).all() or not response.any():

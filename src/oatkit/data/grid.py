@@ -30,7 +30,7 @@ class Grid(ByContent):
         object.__setattr__(self, "pixel_size_m", float(self.pixel_size_m))
         object.__setattr__(self, "centre_m", (float(self.centre_m[0]), float(self.centre_m[1])))
         check_range("pixel_size_m", self.pixel_size_m, 1e-6, 1e-2, "the unit is m, so 0.1 mm is 1e-4")
-        check_range("centre_m", self.centre_m, -1.0, 1.0, "the unit is m")
+        check_range("centre_m", self.centre_m, -1.0, 1.0, "the unit is m, so 10 mm is 0.01")
 
     @cached_property
     def y_m(self) -> np.ndarray:

@@ -15,7 +15,7 @@ def breast() -> Scan:
     """Return a scan of a breast-like phantom at one wavelength."""
     from oatkit.simulate import simulate_scan
 
-    return simulate_scan("breast", _arc(), pixels=331)
+    return simulate_scan("breast", arc(), pixels=331)
 
 
 def oxygen() -> Scan:
@@ -23,14 +23,15 @@ def oxygen() -> Scan:
     from oatkit.simulate import OxygenBody, illuminate, oxygen_phantom, simulate_scan
 
     lit = illuminate(OxygenBody.draw(0), WAVELENGTHS_NM, spacing_m=SPACING_M)
-    return simulate_scan(oxygen_phantom(lit), _arc(), pixels=331)
+    return simulate_scan(oxygen_phantom(lit), arc(), pixels=331)
 
 
 SAMPLES: Mapping[str, Callable[[], Scan]] = {"breast": breast, "oxygen": oxygen}
 """By the name that the manifest knows."""
 
 
-def _arc() -> ForwardModel:
+def arc() -> ForwardModel:
+    """Return the acoustic model that samples are made with."""
     arc = plugin("forward_model", "arc")()
     assert isinstance(arc, ForwardModel)
     return arc

@@ -15,6 +15,7 @@ from oatkit.pipeline import Pipeline
 from oatkit.quantification.absorption import absorption
 from oatkit.quantification.fixed_point import fixed_point
 from oatkit.reconstruction import check_finite
+from oatkit.slips import optics_notes
 from oatkit.tables import AbsorptionTable
 
 Images = Mapping[str, Image]
@@ -59,7 +60,14 @@ def _segment(pipeline: Pipeline, images: Images) -> Images:
 def _fluence(pipeline: Pipeline, images: Images) -> Images:
     assert pipeline.fluence is not None
     optics = pipeline.optics.optics(images["initial_pressure"].wavelengths_nm)
-    return {"fluence": pipeline.fluence.fluence(images["boundary"], optics)}
+    made, notes = pipeline.fluence.fluence(images["boundary"], optics), optics_notes(optics)
+    if not isinstance(made, Image) or not notes:
+        return {"fluence": made}
+    return {
+        "fluence": replace(
+            made, diagnostics={**made.diagnostics, "notes": (*made.diagnostics.get("notes", ()), *notes)}
+        )
+    }
 
 
 def _absorption(pipeline: Pipeline, images: Images) -> Images:

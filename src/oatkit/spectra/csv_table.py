@@ -43,7 +43,12 @@ def _reader(path: Path) -> csv.DictReader:
     except UnicodeDecodeError:
         raise ReadError(f"{path}: expected a CSV file, found bytes that are no text") from None
     lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    return csv.DictReader(lines, skipinitialspace=True)
+    reader = csv.DictReader(lines, skipinitialspace=True)
+    try:
+        reader.fieldnames  # noqa: B018  reads the first line
+    except csv.Error as error:
+        raise ReadError(f"{path}: expected a CSV file, found a broken first line ({error})") from None
+    return reader
 
 
 def _rows(path: Path, names: Sequence[str]) -> np.ndarray:
@@ -55,7 +60,7 @@ def _rows(path: Path, names: Sequence[str]) -> np.ndarray:
         raise ReadError(f"{path}: expected the columns {listed}; missing: {', '.join(missing)}")
     try:
         rows = np.array([[float(row[name]) for name in names] for row in reader])
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, csv.Error):
         raise ReadError(f"{path}: expected a number in each of the columns {listed}") from None
     if len(rows) == 0 or not (np.isfinite(rows).all() and (rows >= 0).all()):
         raise ReadError(f"{path}: expected one or more rows of finite numbers, none of them negative")

@@ -8,7 +8,7 @@ from oatkit.api import Image, Reader, ReadError, Region, Scan, ValidationError, 
 from oatkit.builtin.readers.ithera_annotation import read_annotation
 from oatkit.builtin.readers.ithera_header import Header, read_header, root_of
 from oatkit.builtin.readers.ithera_images import images
-from oatkit.builtin.readers.ithera_signals import raw_signals
+from oatkit.builtin.readers.ithera_signals import odd_size, raw_signals
 from oatkit.hostile import MAX_XML_BYTES, inside, read_at_most
 
 ANNOTATION = ".iannotation"
@@ -63,8 +63,10 @@ class IThera(Reader):
         pulses = header.pulses
         binary = inside(msot.parent, f"{msot.stem}.bin")
         polarity = "Signals were inverted (polarity -1)." if self.polarity < 0 else "Polarity +1: signals as stored."
+        shape = header.geometry.shape
+        signals = raw_signals(binary, pulses.offsets, shape, self.polarity < 0, header.digest)
         return Scan(
-            raw_signals(binary, pulses.offsets, header.geometry.shape, self.polarity < 0, header.digest),
+            signals,
             header.geometry,
             pulses.wavelengths_nm,
             pulse_energy=pulses.energy,
@@ -75,7 +77,7 @@ class IThera(Reader):
             source=str(msot),
             reader=self.name,
             speed_of_sound_source=header.speed_of_sound_source,
-            notes=(*header.notes, polarity),
+            notes=(*header.notes, polarity, *filter(None, [odd_size(binary, shape)])),
         )
 
 

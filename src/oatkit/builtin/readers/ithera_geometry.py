@@ -7,6 +7,7 @@ import numpy as np
 from oatkit.builtin.readers.plane import flat_axes, seen_along
 from oatkit.builtin.readers.xml_fields import Node
 from oatkit.data import Detectors
+from oatkit.hostile import printable
 
 MAX_DETECTORS = 65_536
 
@@ -28,6 +29,12 @@ def _listed(description: Node) -> np.ndarray:
     projections = description.all("PROJECTION")
     if len(projections) > MAX_DETECTORS:
         raise description.error(f"at most {MAX_DETECTORS} elements PROJECTION", str(len(projections)))
+    numbers = [projection.attribute("number") for projection in projections]
+    if None not in numbers and numbers != [str(i + 1) for i in range(len(numbers))]:
+        odd = next(i for i, number in enumerate(numbers) if number != str(i + 1))
+        raise projections[odd].error(
+            f"elements numbered one by one, here {odd + 1}", repr(printable(numbers[odd] or "", 20))
+        )
     return np.array([_point(projection) for projection in projections])
 
 

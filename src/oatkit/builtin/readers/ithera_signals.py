@@ -63,6 +63,12 @@ class RawSignals:
             raise ReadError(f"{self.path}: cannot be read ({error.strerror})") from None
 
 
+def odd_size(path: Path, record: tuple[int, int]) -> str:
+    """Say where a file does not end with a record: a header of another scan, a detector or a sample too few in it."""
+    size, whole = path.stat().st_size, record[0] * record[1] * SAMPLE.itemsize
+    return f"{path.name} holds {size / whole:.6g} records by the header, no whole number." if size % whole else ""
+
+
 def raw_signals(path: Path, offsets: np.ndarray, record: tuple[int, int], inverted: bool, header: str) -> RawSignals:
     """Return the signals of a file that is long enough for them. Raises `ReadError` where it is missing or too short.
 

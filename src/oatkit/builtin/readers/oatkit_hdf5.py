@@ -25,6 +25,7 @@ class OatkitHdf5(Reader):
         with open_hdf5(path) as file:
             about = read_about(file, path)
             signals = hdf5_signals(file, path)
+            _check_complete(file, path, about.get("arrays", []))
             arrays = {name: _array(file, name) for name in ARRAYS if file.get(name, getlink=True) is not None}
         try:
             return _scan(path, about, signals, arrays)
@@ -36,6 +37,15 @@ class OatkitHdf5(Reader):
 
 ARRAYS = {"detectors_m": ("f", 2), "valid": ("u", 3), "impulse_response": ("f", 1)} | dict.fromkeys(PER_PULSE, ("f", 2))
 """Kind of type and number of axes of each array beside the signals."""
+
+
+def _check_complete(file: Any, path: Path, named: Any) -> None:
+    """Raise `ReadError` where a dataset is missing that the file once had; older files do not say which they had."""
+    if not isinstance(named, list):
+        raise ReadError(f"{path} 'about': expected a list of arrays, found {named!r:.60}")
+    lost = [name for name in named if name in ARRAYS and file.get(name, getlink=True) is None]
+    if lost:
+        raise ReadError(f"{path}: expected the dataset '{lost[0]}', found nothing")
 
 
 def _array(file: Any, name: str) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from oatkit.errors import ReadError
-from oatkit.hostile import hdf5_group, printable
+from oatkit.hostile import check_attribute_heaps, hdf5_group, printable
 
 log = logging.getLogger("oatkit")
 
@@ -126,12 +126,17 @@ def _has_results(file: Any) -> bool:
 
 
 def _attribute(item: Any, name: str) -> np.ndarray | None:
-    """Return an attribute as an array; None where it is missing, empty, too large or cannot be read."""
+    """Return an attribute as an array; None where it is missing, empty, too large or cannot be read.
+
+    Raises `ReadError` where a heap of texts is broken.
+    """
     try:
         held = item.attrs.get_id(name)
         count = held.get_space().get_simple_extent_npoints()
         if not 0 < count <= (MAX_TEXTS if held.dtype.hasobject else MAX_NUMBERS):
             return None
+        if held.dtype.hasobject:
+            check_attribute_heaps(item)
         return np.asarray(item.attrs[name])
     except (KeyError, OSError, TypeError, ValueError, RuntimeError):
         return None
