@@ -35,5 +35,6 @@ fi
 "$venv/bin/ruff" format --check .
 "$venv/bin/ruff" check .
 "$venv/bin/mypy"
-# Tests on small dense matrices are several times slower where the BLAS competes with our own threads.
-OPENBLAS_NUM_THREADS=1 exec "$venv/bin/python" -m pytest "$@"
+# Tests on small dense matrices are several times slower where the BLAS competes with our own threads. A file of tests
+# goes to one process, so that what its tests share is made once.
+OPENBLAS_NUM_THREADS=1 exec "$venv/bin/python" -m pytest -n 2 --dist loadfile "$@"
