@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from oatkit.data import Image
-from oatkit.errors import ResultError
+from oatkit.errors import OatkitError
 from oatkit.memo import Memo
 
 PAINTING_S = 0.04
@@ -71,7 +71,7 @@ class StoredPlanes:
     def _image(self, frame: int) -> Image | str:
         try:
             return self._read(frame)
-        except ResultError as error:
+        except OatkitError as error:
             return str(error)
 
     def _planes(self, frame: int) -> np.ndarray:
