@@ -1,5 +1,6 @@
 """Frames on a dask cluster: of this machine, or of any scheduler that has an address."""
 
+import os
 import pickle
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -12,6 +13,9 @@ from oatkit.events import Listener
 from oatkit.memo import Memo
 from oatkit.threads import thread_count
 
+MALLOC, MALLOC_VARIABLES = 2**30, ("MALLOC_TRIM_THRESHOLD_", "MALLOC_MMAP_THRESHOLD_")
+"""dask has workers give memory back at once. Arrays of some 100 kB, which a solver makes at each step, then come as
+fresh pages from the system each time, and take twice as long."""
 DEATHS = 2
 """Of workers that one frame may cost."""
 
@@ -40,6 +44,7 @@ class Dask(Engine):
         settings = {
             "distributed.scheduler.allowed-failures": DEATHS - 1,
             "distributed.scheduler.work-stealing": False,
+            **{f"distributed.nanny.pre-spawn-environ.{name}": MALLOC for name in MALLOC_VARIABLES},
         }
         with dask.config.set(settings):
             given: Any = {"address": self.address} if self.address else self._local()
@@ -91,6 +96,10 @@ _kept: dict[str, tuple[Work, Memo]] = {}
 
 
 def _work(run: str, work: bytes, frame: int) -> Outcome:
+    from distributed import get_worker
+
+    # As many threads as the cluster gives to the worker, unless who set it up says otherwise.
+    os.environ.setdefault("OATKIT_THREADS", str(get_worker().state.nthreads))
     if run not in _kept:
         _kept.clear()
         _kept[run] = pickle.loads(work), Memo()
