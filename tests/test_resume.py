@@ -246,7 +246,9 @@ def test_a_signal_keeps_the_frames(scan, whole, tmp_path, number, code):
     assert "terminated" in said or "interrupted" in said
     done = run_oatkit(*run, "--resume")
     assert done.returncode == 0, done.stderr
+    assert f"wrote {output} in " in done.stdout
     assert same(whole, output)
+    assert run_oatkit(*run, "--resume").stdout.endswith(f"{output} was complete already\n")
 
 
 @pytest.fixture

@@ -77,13 +77,15 @@ def run(
     chosen = shard_of(chosen, shard) if shard else chosen
     by = engine_named(engine, workers, scheduler)
     check_new(output, overwrite or resume)
+    complete = resume and not overwrite and output.exists()
     with ProgressBar(len(chosen)) as bar:
         result = run_frames(
             loaded, found, output, chosen, bar.show, lambda _: bar.next_frame(), overwrite, resume=resume, engine=by
         )
     for line in summary(result):
         typer.echo(line)
-    typer.echo(f"wrote {output} in {time.perf_counter() - start:.1f} s")
+    done = f"wrote {output} in {time.perf_counter() - start:.1f} s"
+    typer.echo(f"{output} was complete already" if complete else done)
     for reason in result.failed.values():
         complain(reason)
     if result.failed:
