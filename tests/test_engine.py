@@ -42,6 +42,8 @@ class Rogue(Solver):
             problem.data[0] = 7
         if self.what == "type":
             yield "an image"  # type: ignore[misc]
+        if self.what == "complex":
+            image = image + 1j
         if self.what == "inside":
             image = "zeros"  # type: ignore[assignment]
         if self.what != "nothing":
@@ -153,6 +155,7 @@ def test_a_run_can_be_left_at_any_iterate(small_scan):
         ("exits", PluginError, "solver 'rogue' failed: SystemExit: 3"),
         ("mutates", PluginError, "solver 'rogue' failed: ValueError: assignment destination is read-only"),
         ("type", PluginError, "solver 'rogue' yielded a str, not an Iterate"),
+        ("complex", PluginError, "solver 'rogue' returned an image of complex128, not of real numbers"),
         ("inside", PluginError, "solver 'rogue' returned an image of"),
     ],
 )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from many_frames import same, write_frames_of
-from oatkit import Pipeline, ValidationError
+from oatkit import Pipeline, ResultError, ValidationError
 from oatkit.batch import engine_named, join, run_frames, shard_of
 from oatkit.store import load, verify
 from packages import install, run_oatkit
@@ -62,6 +62,8 @@ def test_shards_join_to_the_whole(scan, pipeline, whole, tmp_path):
         run_frames(pipeline, scan, parts[-1], frames=shard_of(range(FRAMES), f"{i}/3"))
     join(parts[::-1], tmp_path / "out.zarr")
     assert same(whole, tmp_path / "out.zarr")
+    with pytest.raises(ResultError, match="is the input"):
+        join(parts, parts[0], overwrite=True)
     with pytest.raises(ValidationError, match=r"frames \[1, 4\] are in two"):
         join([*parts, parts[1]], tmp_path / "twice.zarr")
 

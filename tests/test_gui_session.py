@@ -1,13 +1,17 @@
 """The state behind the windows: the numbers of the engine, jobs that always end, and nothing computed twice."""
 
+import threading
 import time
 
 import pytest
 
 import oatkit
 from gui_sessions import small_session
+from many_frames import same
+from oatkit.batch import pieces, run_frames
 from oatkit.errors import SolverError, ValidationError
 from oatkit.events import StepDone
+from oatkit.gui.batch.batch import run_all
 from oatkit.gui.job import Job
 from oatkit.gui.session import Converging, Finished, Session
 from oatkit.gui.warming import warm_up
@@ -114,3 +118,29 @@ def test_warming_up_ends_well():
     job = warm_up()
     assert job.wait(120)
     assert job.failure is None
+
+
+def test_a_cancelled_batch_goes_on(small_scan_file, tmp_path, monkeypatch):
+    """Started again, a batch takes up the frames that were done, and ends in the result of an undisturbed one."""
+    pipeline = small_session(None).document.pipeline
+    whole = run_frames(pipeline, oatkit.read(small_scan_file), tmp_path / "whole.zarr")
+    original, go_on = pieces.run_resolved, threading.Event()
+
+    def waiting(resolved, scan, frame, *more):
+        assert frame == 0 or go_on.wait(30)
+        return original(resolved, scan, frame, *more)
+
+    monkeypatch.setattr(pieces, "run_resolved", waiting)
+    job = run_all(pipeline, [small_scan_file], tmp_path)
+    while not any(state.sentence == "1 of 2 frames" for state in job.drain()):
+        assert not job.done
+        time.sleep(0.001)
+    job.cancel()
+    go_on.set()
+    assert job.wait(30)
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == [".small.zarr.journal", ".small.zarr.unfinished", "whole.zarr"]
+    job = run_all(pipeline, [small_scan_file], tmp_path)
+    assert job.wait(30)
+    assert job.drain()[-1].word == "done"
+    assert same(whole.stored.path, tmp_path / "small.zarr")

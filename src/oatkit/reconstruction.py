@@ -85,6 +85,9 @@ def _checked_iterate(solver: Solver, state: Iterate | None, problem: Problem) ->
     shape = np.shape(state.image)
     if shape != problem.shape:
         raise PluginError(f"solver '{solver.name}' returned an image of shape {shape}, not {problem.shape}")
+    kind = np.asarray(state.image).dtype
+    if kind.kind not in "iuf":
+        raise PluginError(f"solver '{solver.name}' returned an image of {kind}, not of real numbers")
     return state
 
 

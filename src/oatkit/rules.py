@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from oatkit import weights
@@ -40,7 +41,7 @@ class Resolved:
     known: Mapping[str, Mapping[str, Any]] | None = None
     """The `choices`, where they were made by an earlier run."""
 
-    @property
+    @cached_property
     def choices(self) -> Mapping[str, Mapping[str, Any]]:
         """How each number was chosen, as plain values, by its field in a `Result`; empty tables where none was."""
         found = {"speed_choice": self.speed, "weight_choice": self.weight, "calibration_choice": self.calibration}

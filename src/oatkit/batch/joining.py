@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
+from oatkit.atomic import check_output
 from oatkit.errors import ResultError, ValidationError
 from oatkit.result import Result
 from oatkit.store import StoreWriter, load
@@ -29,11 +30,12 @@ def shard_of(frames: Sequence[int], shard: str) -> list[int]:
 def join(paths: Sequence[str | Path], output: str | Path, overwrite: bool = False) -> Result:
     """Join results of parts of one run, in the order of their frames, and return the whole.
 
-    Raises `ResultError` where a part is damaged or cannot be written, and `ValidationError` where the parts are not of
-    one run, or two hold the same frame.
+    Raises `ResultError` where a part is damaged, and where the output cannot be written or is one of the parts;
+    `ValidationError` where the parts are not of one run, or two hold the same frame.
     """
     if not paths:
         raise ValidationError("join: expected one result or more")
+    check_output(Path(output), map(str, paths), overwrite)
     parts = [load(path) for path in paths]
     _check_alike(parts, paths)
     frames = sorted((number, k, i) for k, part in enumerate(parts) for i, number in enumerate(_numbers(part)))

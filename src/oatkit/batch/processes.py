@@ -29,26 +29,25 @@ class Processes(Engine):
 
     def run(self, work: Work, frames: Sequence[int], memo: Memo, on_event: Listener) -> Outcomes:
         """Yield outcomes as they come."""
-        left, suspects = list(frames), list[int]()
-        while left or suspects:
-            # After a death: each frame that was under way alone, so that the poisonous one is known.
-            batch, workers = (suspects[:1], 1) if suspects else (left, self.workers)
-            done = set[int]()
+        left = dict.fromkeys(frames)
+        while left:
             under_way: set[int] = set()
             try:
-                for outcome in self._run(work, batch, workers, under_way):
-                    done.add(outcome.frame)
+                for outcome in self._run(work, list(left), self.workers, under_way):
+                    del left[outcome.frame]
                     yield outcome
             except BrokenProcessPool:
-                if suspects:
-                    done.add(suspects[0])
-                    yield Outcome(suspects[0], error=SolverError(POISONOUS))
-                else:
-                    suspects = sorted(under_way)
-                    done |= under_way
-            if suspects and batch is not left:
-                suspects = suspects[1:]
-            left = [frame for frame in left if frame not in done]
+                # Each that was under way alone, so that the poisonous one is known.
+                for frame in sorted(under_way):
+                    del left[frame]
+                    yield from self._alone(work, frame)
+
+    def _alone(self, work: Work, frame: int) -> Iterator[Outcome]:
+        """Yield the outcome of a frame that is suspected."""
+        try:
+            yield from self._run(work, [frame], 1, set())
+        except BrokenProcessPool:
+            yield Outcome(frame, error=SolverError(POISONOUS))
 
     def _run(self, work: Work, frames: Sequence[int], workers: int, under_way: set[int]) -> Iterator[Outcome]:
         """Yield outcomes from one pool; `under_way` tells which frames it has when it breaks."""

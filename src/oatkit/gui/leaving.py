@@ -1,8 +1,10 @@
-"""What a widget leaves in order when Qt destroys it."""
+"""What a widget leaves in order when its window closes, and when Qt destroys it."""
 
 from collections.abc import Callable
 from typing import Any
 from weakref import WeakMethod
+
+from qtpy.QtCore import QEvent, QObject
 
 _WAITING: set[Callable[..., None]] = set()
 """Held here until they are called: what only Qt holds may be collected while Qt calls it, which crashes."""
@@ -29,3 +31,26 @@ def link(widget: Any, signal: Any, slot: Callable[..., Any]) -> None:
             signal.disconnect(known, missing_ok=True)
 
     when_gone(widget, unlink)
+
+
+def when_closed(widget: Any, action: Callable[[], Any]) -> None:
+    """Call `action` each time the window that the widget is in closes; one that the system made small goes on."""
+    _WindowWatch(widget, action)
+
+
+class _WindowWatch(QObject):
+    """Follows a widget into whatever window it comes, and belongs to it."""
+
+    def __init__(self, widget: Any, action: Callable[[], Any]) -> None:
+        super().__init__(widget)
+        self._widget, self._action = widget, action
+        self._window: Any = None
+        widget.installEventFilter(self)
+
+    def eventFilter(self, watched: Any, event: Any) -> bool:
+        if watched is self._widget and event.type() == QEvent.Type.Show and self._window is not watched.window():
+            self._window = watched.window()
+            self._window.installEventFilter(self)
+        if watched is self._window and event.type() == QEvent.Type.Hide and not event.spontaneous():
+            self._action()
+        return False

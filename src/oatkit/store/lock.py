@@ -11,7 +11,7 @@ from oatkit.errors import ResultError
 
 try:
     import fcntl
-except ImportError:  # Windows: two runs on one output are then found by the folder that both want to make
+except ImportError:  # Windows, where there is no lock
     fcntl = None  # type: ignore[assignment]
 
 ENDING = ".lock"
@@ -22,7 +22,7 @@ def locked(path: Path) -> Iterator[None]:
     """Hold the lock of an output, a hidden file beside it, while the block runs.
 
     Raises `ResultError` where another process holds it, with who that is. A lock that was left behind by a process that
-    was killed is free. On a file system that knows no locks there is none.
+    was killed is free. On Windows, and on a file system that knows no locks, there is none.
     """
     path = path.absolute()
     file = path.with_name(f".{path.name}{ENDING}")

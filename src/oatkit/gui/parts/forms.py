@@ -7,7 +7,7 @@ from pydantic.fields import FieldInfo
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
 
-from oatkit.errors import ValidationError
+from oatkit.errors import OatkitError, ValidationError
 from oatkit.gui.parts.fields import Sort, help_of, is_optional, label_of, parsed, sort_of, written
 from oatkit.gui.parts.inputs import Input, input_for
 from oatkit.gui.parts.plugin_chooser import PluginChooser
@@ -31,6 +31,16 @@ class Message(QLabel):
         """Show a sentence, or nothing for an empty one."""
         self.setText(sentence)
         self.setVisible(bool(sentence))
+
+    def attempt(self, action: Callable[[], Any]) -> bool:
+        """Do what the user asked for, and say what is wrong with it, or nothing; return whether it went well."""
+        try:
+            action()
+        except (OatkitError, OSError) as error:
+            self.say(plain(error))
+            return False
+        self.say("")
+        return True
 
 
 class Form(QWidget):

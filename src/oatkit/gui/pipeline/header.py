@@ -18,10 +18,9 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from oatkit.errors import OatkitError
 from oatkit.gui.document import PipelineDocument
 from oatkit.gui.parts.buttons import tool
-from oatkit.gui.parts.forms import Message, plain
+from oatkit.gui.parts.forms import Message
 from oatkit.gui.parts.inputs import Chooser
 from oatkit.gui.pipeline.script import script_of
 from oatkit.gui.session import Session
@@ -141,14 +140,8 @@ class Header(QWidget):
         return menu
 
     def _try(self, action: Callable[[], Any], done: Any = None) -> None:
-        try:
-            action()
-        except (OatkitError, OSError) as error:
-            self.message.say(plain(error))
-        else:
-            self.message.say("")
-            if done is not None:
-                done.emit()
+        if self.message.attempt(action) and done is not None:
+            done.emit()
 
     def _go_to_frame(self, frame: int) -> None:
         self._try(lambda: self._session.go_to_frame(frame), self.frame_taken)

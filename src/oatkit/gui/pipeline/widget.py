@@ -5,13 +5,13 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
-from qtpy.QtCore import QCoreApplication, QEvent, QTimer
+from qtpy.QtCore import QCoreApplication, QTimer
 from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from oatkit.events import StepIterate
 from oatkit.gui.document import PipelineDocument
 from oatkit.gui.images.layers import KEY
-from oatkit.gui.leaving import link, when_gone
+from oatkit.gui.leaving import link, when_closed, when_gone
 from oatkit.gui.opening import open_path
 from oatkit.gui.pipeline.header import Header
 from oatkit.gui.pipeline.recipe_dialog import RecipeDialog
@@ -36,7 +36,6 @@ class PipelineWidget(QWidget):
         self.bench = workbench(napari_viewer)
         self.runner = Runner(self.bench.session, self)
         self._painted = 0.0
-        self._window: Any = None
         self.header = Header(self.bench.session, partial(open_path, self.bench), self)
         self.stack = Stack(self.runner, self.edit)
         self.preview = PreviewPanel(self.bench, self.runner, self.edit)
@@ -76,6 +75,7 @@ class PipelineWidget(QWidget):
         )
         for signal, slot in watched:
             link(self, signal, slot)
+        when_closed(self, self._stop)
         when_gone(self, runner.stop)
         QCoreApplication.instance().aboutToQuit.connect(runner.stop)
 
@@ -117,17 +117,8 @@ class PipelineWidget(QWidget):
         self.panel.message.say("")
         RecipeDialog(layer.name, about["image"], about.get("result"), self).show()
 
-    def showEvent(self, event: Any) -> None:
-        """Watch the window that this widget has come into."""
-        super().showEvent(event)
-        if self._window is not self.window():
-            self._window = self.window()
-            self._window.installEventFilter(self)
-
-    def eventFilter(self, watched: Any, event: Any) -> bool:
-        """End the run where the window closes; a hidden window that the system made small goes on."""
-        if watched is self._window and event.type() == QEvent.Type.Hide and not event.spontaneous():
-            self.runner.cancel()
-            self.runner.stop()
-            self.preview.stop()
-        return super().eventFilter(watched, event)
+    def _stop(self) -> None:
+        """End what is at work, for the window closes."""
+        self.runner.cancel()
+        self.runner.stop()
+        self.preview.stop()

@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from qtpy.QtCore import Qt, QTimer
-from qtpy.QtWidgets import QFileDialog, QScrollArea, QVBoxLayout, QWidget
+from qtpy.QtCore import QTimer
+from qtpy.QtWidgets import QFileDialog, QVBoxLayout, QWidget
 
 from oatkit.atomic import write_file
 from oatkit.errors import OatkitError, ValidationError
@@ -13,6 +13,7 @@ from oatkit.gui.images.world import from_world
 from oatkit.gui.leaving import when_gone
 from oatkit.gui.parts.forms import Message
 from oatkit.gui.parts.plots import PlotView
+from oatkit.gui.parts.scrolling import scrolled
 from oatkit.gui.probe.layer import ProbeLayer, colour_of
 from oatkit.gui.probe.panels import LINE, POINT, ChromophoreBoxes, Findings, Tools
 from oatkit.gui.probe.probe import (
@@ -210,17 +211,12 @@ class ProbeWidget(QWidget):
         for part in (self.plots, self.findings):
             column.addWidget(part)
         column.addStretch(1)
-        area = QScrollArea()
-        area.setWidgetResizable(True)
-        area.setFrameShape(QScrollArea.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        area.setWidget(inner)
         outer = QVBoxLayout(self)
         outer.setContentsMargins(6, 6, 6, 6)
         outer.setSpacing(4)
         for part in (self.tools, self.boxes, self.message):
             outer.addWidget(part)
-        outer.addWidget(area, 1)
+        outer.addWidget(scrolled(inner), 1)
         self.setMinimumWidth(320)
 
     def _connect(self) -> None:

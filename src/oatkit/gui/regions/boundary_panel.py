@@ -1,15 +1,13 @@
 """The bar for the outline of the body: change it by hand, take it into the pipeline, and let the light follow."""
 
-from collections.abc import Callable
 from typing import Any
 
 from qtpy.QtCore import QTimer
 from qtpy.QtWidgets import QCheckBox, QFrame, QGridLayout, QLabel
 
-from oatkit.errors import ValidationError
 from oatkit.gui.leaving import when_gone
 from oatkit.gui.parts.buttons import button
-from oatkit.gui.parts.forms import Message, plain
+from oatkit.gui.parts.forms import Message
 from oatkit.gui.regions.boundary import Outline, outline_of
 from oatkit.gui.workbench import Workbench
 
@@ -89,16 +87,16 @@ class BoundaryPanel(QFrame):
         return layer is not None and layer.nshapes == 0
 
     def _edit(self) -> None:
-        self._try(self.outline.edit)
+        self.message.attempt(self.outline.edit)
 
     def _draw(self) -> None:
-        self._try(self.outline.draw_anew)
+        self.message.attempt(self.outline.draw_anew)
 
     def _take(self) -> bool:
-        return self._try(self.outline.take)
+        return self.message.attempt(self.outline.take)
 
     def _put_back(self) -> None:
-        self._try(self.outline.put_back)
+        self.message.attempt(self.outline.put_back)
 
     def _run(self) -> None:
         if self.outline.at_work:
@@ -106,12 +104,3 @@ class BoundaryPanel(QFrame):
         elif self.outline.edited and self._take():
             self.bench.run_wanted.emit()
             self.message.say("" if len(self.bench.run_wanted) else NOBODY_RUNS)
-
-    def _try(self, action: Callable[[], None]) -> bool:
-        try:
-            action()
-        except ValidationError as error:
-            self.message.say(plain(error))
-            return False
-        self.message.say("")
-        return True

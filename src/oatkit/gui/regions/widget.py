@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from qtpy.QtCore import Qt, QTimer
+from qtpy.QtCore import QTimer
 from qtpy.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -13,7 +13,6 @@ from qtpy.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
     QLabel,
-    QScrollArea,
     QSizePolicy,
     QVBoxLayout,
     QWidget,
@@ -25,6 +24,7 @@ from oatkit.gui.leaving import when_gone
 from oatkit.gui.parts.buttons import button
 from oatkit.gui.parts.forms import Message, plain
 from oatkit.gui.parts.plots import PlotView
+from oatkit.gui.parts.scrolling import scrolled
 from oatkit.gui.regions.boundary_panel import BoundaryPanel
 from oatkit.gui.regions.drawn import DrawnRegions
 from oatkit.gui.regions.listing import RegionList
@@ -213,12 +213,8 @@ class RegionsWidget(QWidget):
     def _arrange(self) -> None:
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
-        inner, area = QWidget(), QScrollArea()
-        area.setWidget(inner)
-        area.setWidgetResizable(True)
-        area.setFrameShape(QScrollArea.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        outer.addWidget(area)
+        inner = QWidget()
+        outer.addWidget(scrolled(inner))
         column = QVBoxLayout(inner)
         column.setContentsMargins(6, 6, 6, 6)
         column.setSpacing(4)

@@ -1,6 +1,5 @@
 """Keeps results, shows them side by side, and subtracts them."""
 
-from collections.abc import Callable
 from typing import Any
 
 from qtpy.QtCore import Qt
@@ -17,9 +16,8 @@ from qtpy.QtWidgets import (
     QVBoxLayout,
 )
 
-from oatkit.errors import ValidationError
 from oatkit.gui.parts.buttons import button
-from oatkit.gui.parts.forms import Message, plain
+from oatkit.gui.parts.forms import Message
 from oatkit.gui.view.comparison import CURRENT, Comparison, called
 
 LIST_HEIGHT = 96
@@ -129,7 +127,7 @@ class ComparisonPanel(QGroupBox):
             part.setEnabled(len(groups) > 1)
 
     def _keep(self) -> None:
-        if self._try(lambda: self.comparison.keep(self.name.text().strip())):
+        if self.message.attempt(lambda: self.comparison.keep(self.name.text().strip())):
             self.name.setModified(False)
             if self.comparison.is_beside:
                 self._compare()
@@ -145,7 +143,7 @@ class ComparisonPanel(QGroupBox):
         """Take a tick, or a name that was typed."""
         group = item.data(GROUP)
         if item.text() != called(group):
-            self._try(lambda: self.comparison.rename(group, item.text().strip()))
+            self.message.attempt(lambda: self.comparison.rename(group, item.text().strip()))
         else:
             self.comparison.show(group, item.checkState() == Qt.CheckState.Checked)
         self.show_state()
@@ -162,24 +160,15 @@ class ComparisonPanel(QGroupBox):
             self._compare()
 
     def _compare(self) -> None:
-        self._try(lambda: self.comparison.compare(self.image.currentData()))
+        self.message.attempt(lambda: self.comparison.compare(self.image.currentData()))
 
     def _link(self, linked: bool) -> None:
         self.comparison.side_by_side.linked = linked
 
     def _subtract(self) -> None:
         first, second, name = (box.currentData() for box in (self.first, self.second, self.image))
-        self._try(lambda: self.comparison.subtract(first, second, name))
+        self.message.attempt(lambda: self.comparison.subtract(first, second, name))
         self.show_state()
-
-    def _try(self, action: Callable[[], None]) -> bool:
-        try:
-            action()
-        except ValidationError as error:
-            self.message.say(plain(error))
-            return False
-        self.message.say("")
-        return True
 
 
 def _fill(box: QComboBox, entries: dict[str, str]) -> None:

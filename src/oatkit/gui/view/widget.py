@@ -3,10 +3,11 @@
 from functools import partial
 from typing import Any
 
-from qtpy.QtCore import Qt, QTimer
-from qtpy.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
+from qtpy.QtCore import QTimer
+from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from oatkit.gui.leaving import when_gone
+from oatkit.gui.parts.scrolling import scrolled
 from oatkit.gui.view.comparison import Comparison
 from oatkit.gui.view.comparison_panel import ComparisonPanel
 from oatkit.gui.view.unmixing import Unmixing
@@ -48,14 +49,9 @@ class ViewWidget(QWidget):
         for part in (self.wavelength, self.comparison, self.unmixing):
             column.addWidget(part)
         column.addStretch(1)
-        area = QScrollArea()
-        area.setWidget(inside)
-        area.setWidgetResizable(True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         outside = QVBoxLayout(self)
         outside.setContentsMargins(0, 0, 0, 0)
-        outside.addWidget(area)
+        outside.addWidget(scrolled(inside))
         self.setMinimumWidth(316)
 
     def show_state(self) -> None:

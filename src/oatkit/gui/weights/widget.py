@@ -1,11 +1,11 @@
 """The weight widget: sweep it, see the L-curve with what the rules pick, look at points, and take one."""
 
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Any
-from weakref import WeakMethod
 
-from qtpy.QtCore import QCoreApplication, QEvent, Qt, QTimer
+from qtpy.QtCore import QCoreApplication, Qt, QTimer
 from qtpy.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -24,7 +24,7 @@ from qtpy.QtWidgets import (
 from oatkit.atomic import write_file
 from oatkit.errors import OatkitError, ValidationError
 from oatkit.gui.job import Job
-from oatkit.gui.leaving import when_gone
+from oatkit.gui.leaving import link, when_closed, when_gone
 from oatkit.gui.parts.buttons import button
 from oatkit.gui.parts.forms import Message, plain
 from oatkit.gui.parts.plots import PlotView
@@ -59,7 +59,6 @@ class WeightWidget(QWidget):
         self._begun: list[Job] = []
         """The job and those before it that may not be at their end yet."""
         self._seconds = 0.0
-        self._window: Any = None
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.view = PlotView(self.bench.viewer)
         self.view.picked.connect(lambda plot, curve, point: self.look_at(point))
@@ -67,10 +66,10 @@ class WeightWidget(QWidget):
         self._timer = QTimer(self)
         self._timer.setInterval(PERIOD_MS)
         self._timer.timeout.connect(self._look)
-        links = [(self.bench.scan_changed, self._follow_scan), (self.bench.pipeline_changed, self._follow_pipeline)]
-        for signal, slot in links:
-            signal.connect(slot)
-        self._leave = _leaver([(signal, WeakMethod(slot)) for signal, slot in links], self._begun)
+        link(self, self.bench.scan_changed, self._follow_scan)
+        link(self, self.bench.pipeline_changed, self._follow_pipeline)
+        self._leave = partial(_end_all, self._begun)  # it outlives the widget, and must not keep it or its window
+        when_closed(self, self._stop)
         when_gone(self, self._leave)
         QCoreApplication.instance().aboutToQuit.connect(self._leave)
         self._follow_scan()
@@ -140,19 +139,10 @@ class WeightWidget(QWidget):
         else:
             self.step(by)
 
-    def showEvent(self, event: Any) -> None:
-        """Watch the window that this widget has come into."""
-        super().showEvent(event)
-        if self._window is not self.window():
-            self._window = self.window()
-            self._window.installEventFilter(self)
-
-    def eventFilter(self, watched: Any, event: Any) -> bool:
-        """End the sweep where the window closes; a hidden window that the system made small goes on."""
-        if watched is self._window and event.type() == QEvent.Type.Hide and not event.spontaneous():
-            self.cancel()
-            _end_all(self._begun)
-        return super().eventFilter(watched, event)
+    def _stop(self) -> None:
+        """End the sweep, for the window closes."""
+        self.cancel()
+        _end_all(self._begun)
 
     def _request(self) -> Request:
         looked_at = self.wavelength.currentIndex() == 1 and self.wavelength.isVisibleTo(self)
@@ -310,18 +300,6 @@ class WeightWidget(QWidget):
         path, _ = QFileDialog.getSaveFileName(self, "Save the curve", "weights.png", "PNG (*.png)")
         if path:
             self.save_png(Path(path))
-
-
-def _leaver(links: list[tuple[Any, WeakMethod[Any]]], jobs: list[Job]) -> Any:
-    """Return what ends jobs and takes slots off signals; it outlives the widget, and must not keep it or its window."""
-
-    def leave(*_: Any) -> None:
-        for signal, weak in links:
-            if (slot := weak()) is not None:
-                signal.disconnect(slot, missing_ok=True)
-        _end_all(jobs)
-
-    return leave
 
 
 def _end_all(jobs: list[Job]) -> None:
