@@ -20,11 +20,14 @@ DEATHS = 2
 """Of workers that one frame may cost."""
 
 
+POISONOUS = f"{DEATHS} workers that ran it died; it may need more memory than there is"
+
+
 class Dask(Engine):
     """Any cluster that `distributed.Client` reaches; without an address, a `LocalCluster`.
 
-    A frame whose worker dies is run again by another; one that has cost `DEATHS` workers has failed. Workers must have
-    oatkit, the plugins of the pipeline, and see the scan under the same path.
+    A frame whose worker dies is run again by another; one that costs `DEATHS` workers alone has failed. Workers must
+    have oatkit, the plugins of the pipeline, and see the scan under the same path.
     """
 
     def __init__(self, address: str = "", workers: int | None = None) -> None:
@@ -55,13 +58,14 @@ class Dask(Engine):
         return {"n_workers": self.workers, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
 
     def _run(self, client: Any, work: Work, frames: Sequence[int]) -> Iterator[Outcome]:
-        from distributed import as_completed
+        from distributed import KilledWorker, as_completed
 
         # Not scattered: what is scattered is lost with the last worker that has it.
         shared, run = pickle.dumps(work), uuid4().hex
         queue = iter(frames)
         most = IN_FLIGHT * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
         waiting: dict[Any, int] = {}
+        suspects: list[int] = []
 
         def submit() -> Any:
             frame = next(queue, None)
@@ -74,21 +78,21 @@ class Dask(Engine):
         first = [future for _ in range(most) if (future := submit()) is not None]
         coming = as_completed(first, loop=client.loop)
         for future in coming:
-            yield _outcome(future, waiting.pop(future))
+            frame = waiting.pop(future)
+            try:
+                yield future.result()
+            except KilledWorker:
+                suspects.append(frame)
             future.release()
             if (another := submit()) is not None:
                 coming.add(another)
-
-
-def _outcome(future: Any, frame: int) -> Outcome:
-    from distributed import KilledWorker
-
-    try:
-        return future.result()
-    except KilledWorker:
-        return Outcome(
-            frame, error=SolverError(f"{DEATHS} workers that ran it died; it may need more memory than there is")
-        )
+        # dask also blames a frame that only waited at a worker that died: each alone, so that the poisonous one is
+        # known.
+        for frame in suspects:
+            try:
+                yield client.submit(_work, run, shared, frame, pure=False).result()
+            except KilledWorker:
+                yield Outcome(frame, error=SolverError(POISONOUS))
 
 
 _kept: dict[str, tuple[Work, Memo]] = {}
