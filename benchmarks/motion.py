@@ -1,4 +1,4 @@
-"""How many pulses out of place are found, and how many at rest are taken for such; prints the tables of docs/time.md.
+"""How many pulses out of place are found, and how many at rest are taken for such; makes docs/guides/time.md.
 
     python benchmarks/motion.py
 

@@ -1,4 +1,4 @@
-"""What band, number of steps and method do to the image of one simulated body; prints the table of docs/practice.md.
+"""What band, number of steps and method do to the image of one simulated body, as docs/guides/practice.md shows.
 
     python benchmarks/practice.py
 

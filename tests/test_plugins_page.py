@@ -14,7 +14,7 @@ from oatkit.scanfile import write_scan
 from oatkit.simulate import arc_detectors, disc, simulate_scan
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "docs" / "plugins.md").read_text()
+PAGE = (ROOT / "docs" / "tutorials" / "plugin.md").read_text()
 PACKAGE = "oatkit-my-sirt"
 SIRT = ROOT / "plugins" / "oatkit-sirt"
 BLOCKS = re.findall(r"```(sh|python|toml|text)\n(.*?)```", PAGE, re.DOTALL)

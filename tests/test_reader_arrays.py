@@ -453,12 +453,12 @@ def test_the_users_file_cannot_be_written(tmp_path):
 
 # The page on formats -------------------------------------------------------------------------------------------------
 
-PAGE = (Path(__file__).parents[1] / "docs" / "formats.md").read_text()
+PAGE = (Path(__file__).parents[1] / "docs" / "guides" / "formats.md").read_text()
 EXAMPLE, ARC_EXAMPLE = re.findall(r"```toml\n(.*?)```", PAGE[PAGE.index("## Plain arrays") :], re.DOTALL)[:2]
 
 
 def test_the_example_of_the_page_is_read(tmp_path):
-    """The description that docs/formats.md shows opens a scan with all that it names."""
+    """The description that docs/guides/formats.md shows opens a scan with all that it names."""
     stored, whole = numbers()
     np.save(tmp_path / "scan.npy", stored)
     write_mat(tmp_path / "ringCup.mat", transducerPos=arc_detectors(5).positions_m.T[[1, 0, 0]] * [[1], [1], [0]])
@@ -474,5 +474,5 @@ def test_the_example_of_the_page_is_read(tmp_path):
 
 
 def test_the_arc_of_the_page_is_the_default_array(tmp_path):
-    """The table that docs/formats.md shows is an MSOT256-TF."""
+    """The table that docs/guides/formats.md shows is an MSOT256-TF."""
     assert detectors_of(tmp_path, 256, ARC_EXAMPLE) == arc_detectors()
