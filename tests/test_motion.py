@@ -236,7 +236,7 @@ def test_the_command_says_what_moved(restless, tmp_path):
 
 
 def test_the_page_on_time_shows_what_happens(tmp_path, monkeypatch):
-    """The script of the page on time writes its scans, the text that it shows is printed of them, its pipeline loads."""
+    """The script of the page writes its scans, the text that it shows is printed of them, its pipeline loads."""
     page = (Path(__file__).parents[1] / "docs" / "guides" / "time.md").read_text()
     monkeypatch.chdir(tmp_path)
     exec(re.findall(r"```python\n(.*?)```", page, re.DOTALL)[0], {})
