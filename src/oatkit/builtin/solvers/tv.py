@@ -15,7 +15,7 @@ class TvSolver(SparseSolver):
     as for `l1`.
 
     References:
-        [Beck2009] Beck and Teboulle, IEEE Trans. Image Process. 18, 2419 (2009), 10.1109/TIP.2009.2028250.
+        [Beck2009b] Beck and Teboulle, IEEE Trans. Image Process. 18, 2419 (2009), 10.1109/TIP.2009.2028250.
     """
 
     name: ClassVar[str] = "tv"
