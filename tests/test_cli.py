@@ -33,6 +33,9 @@ COMMANDS = (
     "challenge",
     "kinetics",
     "report",
+    "join",
+    "cite",
+    "new-plugin",
     "gui",
 )
 

@@ -15,7 +15,7 @@ HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg",
 
 ORDER = [
     {"checkpoint", "compiled", "errors", "laplacian", "names", "vectors"},
-    {"content", "atomic", "threads", "plain", "page", "hdf5_heaps"},
+    {"bibliography", "content", "atomic", "threads", "plain", "page", "hdf5_heaps"},
     {"hostile", "data", "plot"},
     {
         "parameters", "checked", "csv_cell", "label_files", "light", "metrics", "polygons", "scale", "scanfile",
@@ -33,7 +33,7 @@ ORDER = [
     {"stepping"},
     {"calibrating"},
     {"rules"},
-    {"store", "engine", "describe"},
+    {"store", "engine", "describe", "citing"},
     {"batch", "convert", "export", "report", "summary", "progress"},
     {"demo_oxygen"},
     {"demo", "paper"},

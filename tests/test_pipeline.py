@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from oatkit import Pipeline, ValidationError, plugin
+from oatkit import Pipeline, ValidationError, plugin, run
 from oatkit.pipeline import presets
 
 BAD = """
@@ -173,3 +173,9 @@ def test_an_empty_right_side_takes_a_key_out():
     there, absent = (Pipeline.load("maxent-absorption", [f"fluence.{key}="]) for key in ("ring_radius", "index_body"))
     assert there.fluence.ring_radius is None
     assert absent == Pipeline.load("maxent-absorption")
+
+
+def test_a_results_pipeline_makes_the_pipeline_again(small_scan):
+    """What a result keeps of its pipeline is enough to have the pipeline back."""
+    pipeline = Pipeline.load("lsqr", ["grid.pixels=24", "grid.field_of_view_mm=9"])
+    assert Pipeline.of_table(run(pipeline, small_scan).pipeline) == pipeline

@@ -54,6 +54,16 @@ def as_shape(shape: Any) -> tuple[int, int]:
     return int(shape[0]), int(shape[1])
 
 
+def as_start(start: Any, shape: tuple[int, int]) -> np.ndarray | None:
+    """Return an image to begin near, read-only."""
+    if start is None:
+        return None
+    start = np.asarray(start, dtype=float)
+    if start.shape != tuple(shape) or not np.isfinite(start).all():
+        raise ValidationError(f"problem: expected start as an image of shape {tuple(shape)} of finite numbers")
+    return read_only(start)
+
+
 def as_valid(valid: Any, geometry: Geometry | None) -> np.ndarray | None:
     """Return which detectors count, read-only."""
     if valid is None:

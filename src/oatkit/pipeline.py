@@ -65,7 +65,7 @@ class Pipeline(Parameters):
         Raises as `loads` does.
         """
         try:
-            pipeline = cls.model_validate(table, context=Context(installed().find, folder))
+            pipeline = cls.model_validate(dict(table), context=Context(installed().find, folder))
         except pydantic.ValidationError as error:
             lines = [f"{origin}{_where(path, table)}: {text}" for path, text in problems(error)]
             raise ValidationError("\n".join(lines)) from None

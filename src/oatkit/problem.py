@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from oatkit.checked import as_data, as_operator, as_product, as_shape, as_valid
+from oatkit.checked import as_data, as_operator, as_product, as_shape, as_start, as_valid
 from oatkit.data import Geometry, Grid, Image, Optics
 from oatkit.errors import SolverError, ValidationError
 from oatkit.scale import Reference, recall_norm, reference, remember_norm, returned, spectral_norm
@@ -36,6 +36,9 @@ class Problem:
     valid: np.ndarray | None = None
     """Which detectors count, bool, shape ``(detector,)``; None where all do. In the rows of the others operator and
     data are zero: an inversion need not look at it, a sum over detectors must."""
+    start: np.ndarray | None = None
+    """An image of nearby data, where there is one: in a scan that of the wavelength before, in the same frame. A solver
+    may begin near it to have fewer steps to go; what it solves does not depend on it."""
 
     def __post_init__(self) -> None:
         checked = {
@@ -43,6 +46,7 @@ class Problem:
             "data": as_data(self.data),
             "shape": as_shape(self.shape),
             "valid": as_valid(self.valid, self.geometry),
+            "start": as_start(self.start, self.shape),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)

@@ -62,7 +62,8 @@ def reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iter
     solver = pipeline.reconstruct
     last: list[Iterate] = []
     norms: list[float] = []
-    for wavelength, problem in problems(pipeline, clean, grid, memo):
+    for wavelength, alone in problems(pipeline, clean, grid, memo):
+        problem = replace(alone, start=last[-1].image) if last else alone
         state = None
         with blame(solver):
             for state in solver.iterate(problem):

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+import oatkit
 from oatkit.checkpoint import at_checkpoints
 from oatkit.errors import OatkitError, PluginError, ReadError, ResultError, SolverError, ValidationError
 
@@ -22,6 +23,24 @@ app = typer.Typer(
     help="Optoacoustic tomography: from a scan to a non-negative image. "
     "Start with `oatkit demo`, then `oatkit run maxent SCAN -o OUT.zarr` and `oatkit export OUT.zarr picture.png`.",
 )
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"oatkit {oatkit.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version of oatkit, and exit."
+        ),
+    ] = False,
+) -> None: ...
+
 
 EXIT_CODES: dict[type[OatkitError], int] = {
     ResultError: 1, ValidationError: 2, PluginError: 2, SolverError: 3, ReadError: 4,

@@ -25,7 +25,10 @@ def new_plugin(
         Path, typer.Option("--output", "-o", metavar="DIR", help="An existing folder; the package gets one in it.")
     ] = Path(),
 ) -> None:
-    """Write a package with a plugin in it that works, and a test, to start one's own from."""
+    """Write a package with a plugin that works, to start from.
+
+    It has a test of the plugin, too.
+    """
     from oatkit.scaffold import new_plugin as write
 
     target = write(name, kind, folder)

@@ -1,4 +1,4 @@
-"""Commands that tell what is there: presets and plugins."""
+"""Commands that tell what is there, presets and plugins, and where it comes from."""
 
 import json
 from dataclasses import asdict
@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from oatkit.cli.app import AsJson, command
+from oatkit.cli.app import AsJson, Changes, command
 from oatkit.errors import PluginError, ValidationError
 
 
@@ -42,7 +42,10 @@ def plugins(
         typer.Option(min=0.1, help="How long --check waits for each distribution to load; checks have ten times that."),
     ] = 60.0,
 ) -> None:
-    """List all plugins by kind; for a broken one, the reason. OATKIT_PLUGINS=none starts without anybody else's."""
+    """List all plugins by kind; for a broken one, the reason.
+
+    OATKIT_PLUGINS=none in the environment leaves out all that did not come with oatkit.
+    """
     if check:
         _check(check, seconds, as_json)
         return
@@ -91,7 +94,10 @@ def _line(row: dict[str, Any]) -> str:
 def describe(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A plugin's name, as `oatkit plugins` lists it.")],
 ) -> None:
-    """Print what a plugin does, its reference, and its parameters with type, unit, range and default."""
+    """Print what a plugin does, its references and parameters.
+
+    Each parameter with its type, unit, range and default.
+    """
     from oatkit.api import KINDS
     from oatkit.describe import plugin_text
     from oatkit.names import did_you_mean
@@ -104,3 +110,20 @@ def describe(
     for entry in entries:
         origin = f"{entry.distribution} {entry.version}"
         typer.echo(plugin_text(entry.cls, origin) if entry.cls else f"{entry.full_name}: {entry.problem}")
+
+
+@command
+def cite(
+    pipeline: Annotated[
+        str, typer.Argument(metavar="PIPELINE", help="A preset or a .toml file; without it, only oatkit itself.")
+    ] = "",
+    changes: Changes = [],  # noqa: B006 - typer wants a plain list
+) -> None:
+    """Print BibTeX of oatkit and of what a pipeline uses.
+
+    Methods by the references of their plugins, spectra and tissues by those of their tables.
+    """
+    from oatkit.citing import bibtex
+    from oatkit.pipeline import Pipeline
+
+    typer.echo(bibtex(Pipeline.load(pipeline, changes) if pipeline else None))

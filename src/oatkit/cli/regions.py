@@ -37,7 +37,10 @@ def roi(
     as_json: AsJson = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Print mean, spread, negative pixels and CNR of regions of interest, for each image, wavelength and frame."""
+    """Measure regions of interest in the images of a result.
+
+    Prints mean, spread, negative pixels and CNR for each region, image, wavelength and frame.
+    """
     from oatkit.plain import encode
     from oatkit.regions import region_table, write_csv
     from oatkit.regions.text import table_text

@@ -18,7 +18,7 @@ def export(
     frame: Annotated[int | None, typer.Option(help="Which frame of the result; else the first one.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write the images of a result as a figure, an OME-TIFF or an HDF5 file."""
+    """Write a result as a figure, an OME-TIFF or an HDF5 file."""
     from oatkit.export import export as write
 
     check_new(file, overwrite)
@@ -34,7 +34,10 @@ def report(
     frame: Annotated[int | None, typer.Option(help="Which frame of the result; else the first one.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write one page of a result for a browser or a printer: images, spectra, certificates, pipeline, provenance."""
+    """Write one page of a result, for a browser or a printer.
+
+    It has images, spectra, certificates, the pipeline and where all of it came from.
+    """
     from oatkit.report import write_report
     from oatkit.store import load
 
@@ -51,7 +54,10 @@ def join(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.zarr", help="The folder to write.")],
     overwrite: Overwrite = False,
 ) -> None:
-    """Join results of parts of one run (`oatkit run --shard I/N`) into one, in the order of their frames."""
+    """Join the results of `oatkit run --shard I/N` into one.
+
+    Its frames stand in the order of the scan.
+    """
     from oatkit.batch import join as joined
 
     check_new(output, overwrite)
@@ -61,7 +67,7 @@ def join(
 
 @command
 def verify(result: ResultPath) -> None:
-    """Check that a result is complete and that no bit of it has changed."""
+    """Check that a result is complete and no bit of it has changed."""
     from oatkit.store import verify as problems_of
 
     found = problems_of(result)

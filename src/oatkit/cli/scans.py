@@ -26,7 +26,10 @@ class Phantom(StrEnum):
 
 @command
 def info(scan: ScanPath, as_json: AsJson = False) -> None:
-    """Print what is in a scan file, where its speed of sound came from, and the images and regions beside it."""
+    """Print what is in a scan file, and what lies beside it.
+
+    It says where the speed of sound came from, and lists stored images and regions.
+    """
     from oatkit.describe import look_beside, scan_table, scan_text
     from oatkit.reading import read
 
@@ -63,7 +66,10 @@ def run(
         ),
     ] = "",
 ) -> None:
-    """Run a pipeline over a scan and write the images, with how they came about, to a folder."""
+    """Run a pipeline over a scan and write its images.
+
+    The folder that is written also holds how they came about.
+    """
     from oatkit.batch import engine_named, run_frames, shard_of
     from oatkit.pipeline import Pipeline
     from oatkit.progress import ProgressBar
@@ -101,7 +107,10 @@ def motion(
     as_json: AsJson = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Find pulses out of place, by breathing or otherwise; to leave such frames out: --set motion.leave_out=true."""
+    """Find pulses out of place, by breathing or otherwise.
+
+    To leave such frames out: oatkit run --set motion.leave_out=true.
+    """
     from oatkit.describe import motion_text
     from oatkit.motion import find_motion
     from oatkit.reading import read
@@ -133,7 +142,10 @@ def focus(
     as_json: AsJson = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Find the speed of sound that gives the sharpest image; to use it: --set scan.speed_of_sound_m_s=focus."""
+    """Find the speed of sound that gives the sharpest image.
+
+    To use it: oatkit run --set scan.speed_of_sound_m_s=focus.
+    """
     from oatkit.describe import focus_text
     from oatkit.focus import focus as find
     from oatkit.pipeline import Pipeline
@@ -158,7 +170,10 @@ def focus(
 @command
 def simulate(
     phantom: Annotated[
-        Phantom, typer.Argument(help="What is imaged; oxygen: vessels in a body that dims its light, 680 .. 900 nm.")
+        Phantom,
+        typer.Argument(
+            metavar="PHANTOM", help="What is imaged; oxygen: vessels in a body that dims its light, 680 .. 900 nm."
+        ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="SCAN.h5", help="The scan file to write.")],
     snr: Annotated[
@@ -168,7 +183,10 @@ def simulate(
     frames: Annotated[int, typer.Option(min=1, help="How many, each with noise of its own.")] = 1,
     overwrite: Overwrite = False,
 ) -> None:
-    """Simulate a scan of a phantom on a finer grid than the one that reconstructs, and write it with the truth."""
+    """Simulate a scan of a phantom, and write it with the truth.
+
+    It is simulated on a finer grid than the one that reconstructs.
+    """
     from oatkit.demo import simulated
     from oatkit.scanfile import write_scan
 
@@ -209,7 +227,10 @@ def convert(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="What to write; its ending says in which format.")],
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a scan in another format: .h5 is the scan file of oatkit, .hdf5 is IPASC."""
+    """Write a scan in another format.
+
+    An ending .h5 gives the scan file of oatkit, .hdf5 gives IPASC.
+    """
     from oatkit.convert import convert as write
     from oatkit.reading import read
 

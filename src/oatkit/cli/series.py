@@ -21,7 +21,10 @@ def challenge(
     image: Annotated[str, typer.Option(metavar="NAME", help="Which image of the result.")] = "so2",
     overwrite: Overwrite = False,
 ) -> None:
-    """Write how an image differs between two states, as in a gas challenge: means, change and its standard error."""
+    """Write how an image differs between two states of the body.
+
+    As in a gas challenge: the means, their difference and its standard error, by pixel.
+    """
     from oatkit.kinetics import gas_challenge
     from oatkit.store import load
 
@@ -46,7 +49,10 @@ def kinetics(
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write what an image does after a baseline: peak, time to peak, area under the curve, wash-in, by pixel."""
+    """Write what an image does over time, after a baseline.
+
+    Peak, time to peak, area under the curve and wash-in, by pixel.
+    """
     from oatkit.atomic import write_file
     from oatkit.kinetics import contrast_kinetics, curve_text, curves_csv, region_curves
     from oatkit.store import load

@@ -16,7 +16,10 @@ def demo(
     ),
     overwrite: Overwrite = False,
 ) -> None:
-    """Simulate scans, reconstruct one three ways and find the oxygen in another, each beside the truth. No network."""
+    """Simulate scans and show what becomes of them; needs no file.
+
+    One is reconstructed three ways, the oxygen is found in another, each beside the truth.
+    """
     from oatkit.demo import run_demo
 
     start = time.perf_counter()
@@ -38,7 +41,10 @@ def paper(
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Repeat an experiment of Prakash et al. 2019: a figure, and a table of the paper's figures beside ours."""
+    """Repeat an experiment of the paper on maximum entropy (2019).
+
+    Prakash and others, IEEE Trans. Biomed. Eng.: a figure, and a table of the paper's numbers beside ours.
+    """
     from oatkit.paper.experiments import EXPERIMENTS
     from oatkit.paper.running import run_experiment
 

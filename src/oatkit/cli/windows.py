@@ -23,7 +23,7 @@ def gui(
         typer.Argument(metavar="FILE", readable=False, help="A scan, a result (.zarr) or a pipeline (.toml)."),
     ] = None,
 ) -> None:
-    """Open napari with the windows of oatkit, and a file in it."""
+    """Open napari with the windows of oatkit, and a file in them."""
     _check_installed()
     _check_display()
     try:

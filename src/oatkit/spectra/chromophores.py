@@ -34,10 +34,10 @@ class Chromophore:
     """Where the numbers come from."""
 
 
-PRAHL = "S. Prahl, Oregon Medical Laser Center, from W. B. Gratzer and N. Kollias"
-HALE = "G. M. Hale, M. R. Querry, Appl. Opt. 12, 555 (1973)"
-VAN_VEEN = "R. L. P. van Veen et al., J. Biomed. Opt. 10, 054004 (2005)"
-JACQUES = "interior of a melanosome; S. L. Jacques, Phys. Med. Biol. 58, R37 (2013)"
+PRAHL = "S. Prahl, Oregon Medical Laser Center, from W. B. Gratzer and N. Kollias, omlc.org/spectra/hemoglobin"
+HALE = "G. M. Hale, M. R. Querry, Appl. Opt. 12, 555 (1973), 10.1364/AO.12.000555"
+VAN_VEEN = "R. L. P. van Veen et al., J. Biomed. Opt. 10, 054004 (2005), 10.1117/1.2085149"
+JACQUES = "interior of a melanosome; S. L. Jacques, Phys. Med. Biol. 58, R37 (2013), 10.1088/0031-9155/58/11/R37"
 PATATO = "PATATO's table, whose unit is not stated, scaled to 1 at its maximum (810 nm)"
 
 _KNOWN = (

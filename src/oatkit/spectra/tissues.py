@@ -47,8 +47,8 @@ class Tissue:
         return Optics(tuple(wavelengths_nm), absorption, scattering)
 
 
-JACQUES = "S. L. Jacques, Phys. Med. Biol. 58, R37 (2013)"
-ALEXANDRAKIS = "mouse; G. Alexandrakis et al., Phys. Med. Biol. 50, 4225 (2005), table 1"
+JACQUES = "S. L. Jacques, Phys. Med. Biol. 58, R37 (2013), 10.1088/0031-9155/58/11/R37"
+ALEXANDRAKIS = "mouse; G. Alexandrakis et al., Phys. Med. Biol. 50, 4225 (2005), 10.1088/0031-9155/50/17/021, table 1"
 
 
 def _of_mouse(blood_volume: float, oxygen_saturation: float, water: float, factor: float, power: float) -> Tissue:

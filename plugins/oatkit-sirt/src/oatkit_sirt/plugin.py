@@ -12,7 +12,10 @@ from oatkit.api import Iterate, Problem, Solver, param
 class Sirt(Solver):
     """SIRT under x >= 0: x <- max(0, x + A^T R (b - A x) / |A^T R A|), where R divides by squared norms of rows of A.
 
-    After Hansen and Saxild-Hansen, J. Comput. Appl. Math. 236, 2167 (2012), 10.1016/j.cam.2011.09.039. No certificate.
+    No certificate.
+
+    References:
+        Hansen and Saxild-Hansen, J. Comput. Appl. Math. 236, 2167 (2012), 10.1016/j.cam.2011.09.039.
     """
 
     name: ClassVar[str] = "sirt"

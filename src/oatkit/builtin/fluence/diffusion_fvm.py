@@ -36,6 +36,9 @@ class DiffusionFvm(ThroughWater):
     passes, as if the body were mirrored there.
 
     Outside of the body the image shows g itself, in the water.
+
+    References:
+        [Haskell1994] Haskell et al., J. Opt. Soc. Am. A 11, 2727 (1994), 10.1364/JOSAA.11.002727.
     """
 
     name: ClassVar[str] = "diffusion-fvm"

@@ -15,6 +15,9 @@ def wall_factor(index_body: float, index_couplant: float) -> float:
         R_j = \int_0^{\pi/2} 3 \sin\theta \cos^2\theta R(\theta) d\theta
 
     R is the reflectance of unpolarised light inside the body; equal indices give 1.
+
+    References:
+        [Haskell1994] Haskell et al., J. Opt. Soc. Am. A 11, 2727 (1994), 10.1364/JOSAA.11.002727.
     """
     ratio = index_couplant / index_body
     nodes, weights = np.polynomial.legendre.leggauss(100)

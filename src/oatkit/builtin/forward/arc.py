@@ -8,7 +8,7 @@ from oatkit.api import ForwardModel, Geometry, Grid, param
 class Arc(ForwardModel):
     r"""Integrals over circular arcs, computed without a matrix.
 
-    .. math:: p(t) = \frac{dI}{dR}\Big|_{R = ct}, \qquad I(R) = \frac{1}{R} \int_{|r - r_d| = R} H(r) \, dl
+    .. math:: p(t) = \left. \frac{dI}{dR} \right|_{R = ct}, \qquad I(R) = \frac{1}{R} \int_{|r - r_d| = R} H(r) \, dl
 
     with lengths in m and without the factor 1 / (4 pi). This is the wave of a thin slab in the image plane in three
     dimensions, not the solution of the wave equation in two.

@@ -6,9 +6,9 @@ from oatkit.api import ForwardModel, Geometry, Grid, param
 
 
 class Immi(ForwardModel):
-    r"""The interpolated model matrix of the paper, as a scipy CSR matrix.
+    r"""The interpolated model matrix of [Prakash2019]_, as a scipy CSR matrix.
 
-    .. math:: p(t) = \frac{dI}{dR}\Big|_{R = ct}, \qquad I(R) = \frac{1}{R} \int_{|r - r_d| = R} H(r) \, dl
+    .. math:: p(t) = \left. \frac{dI}{dR} \right|_{R = ct}, \qquad I(R) = \frac{1}{R} \int_{|r - r_d| = R} H(r) \, dl
 
     in the convention of `arc`. The image between the pixel centres is bilinear; the arc through one pixel is taken as
     straight, so that its integral has a closed form; the derivative is a central difference of fourth order, which
@@ -17,6 +17,9 @@ class Immi(ForwardModel):
 
     Where a pixel is 2.6 samples wide the matrix has 6.6 entries of 8 bytes (in single precision) for each pair of a
     pixel and a detector: 0.9 GB for 256 x 256 pixels and 256 detectors, and twice that while it is built.
+
+    References:
+        [Prakash2019] Prakash et al., IEEE Trans. Biomed. Eng. (2019), 10.1109/TBME.2019.2892842.
     """
 
     name: ClassVar[str] = "immi"

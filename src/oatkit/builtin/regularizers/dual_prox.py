@@ -38,11 +38,11 @@ def proximal(
     """Return the u that minimises |u - v|^2 / 2 + step |K u|_1 for an image v of shape ``(y, x)``, perhaps over u >= 0.
 
     In closed form where there is one, and where the step is so long that K sees nothing of u. Else by fast gradient
-    projection on the dual [Beck2009]_, from the dual variable `start` where one is given, until the gap is at most
+    projection on the dual [Beck2009b]_, from the dual variable `start` where one is given, until the gap is at most
     `largest_gap` or the rounding of its terms, or `n_steps` are done.
 
     References:
-        [Beck2009] Beck and Teboulle, IEEE Trans. Image Process. 18, 2419 (2009), 10.1109/TIP.2009.2028250.
+        [Beck2009b] Beck and Teboulle, IEEE Trans. Image Process. 18, 2419 (2009), 10.1109/TIP.2009.2028250.
     """
     if analysis.has_closed_form(non_negative):
         dual = clipped(analysis.analyse(image), step)

@@ -14,6 +14,9 @@ class Entropy(Smooth, Proximable):
 
     It is 0 at x = m, infinite where a pixel is negative, and pulls towards m, not towards 0. Eq. 14 of [Prakash2019]_
     lacks the last two terms, which amounts to m = m_paper / e.
+
+    References:
+        [Prakash2019] Prakash et al., IEEE Trans. Biomed. Eng. (2019), 10.1109/TBME.2019.2892842.
     """
 
     name: ClassVar[str] = "entropy"

@@ -12,6 +12,9 @@ class Laplacian(Quadratic, Smooth):
     """|L x|^2 with the 5-point Laplacian L in pixel units and Neumann edges: straight slopes are free [Prakash2019]_.
 
     L is symmetric. A constant image costs nothing.
+
+    References:
+        [Prakash2019] Prakash et al., IEEE Trans. Biomed. Eng. (2019), 10.1109/TBME.2019.2892842.
     """
 
     name: ClassVar[str] = "laplacian"

@@ -30,13 +30,13 @@ class TotalVariation(Proximable):
         return Gradient().value(np.asarray(image, dtype=float))
 
     def prox(self, image: np.ndarray, step: float) -> np.ndarray:
-        """Return the proximal point v - K^T y by its dual [Beck2009]_.
+        """Return the proximal point v - K^T y by its dual [Beck2009b]_.
 
         Its objective is within 1e-15 of |v|^2 / 2 + step |v|_1 of the minimum, about the rounding of its terms, where
         20 000 steps suffice: they did for images of 20 x 20 pixels and steps up to their height.
 
         References:
-            [Beck2009] Beck and Teboulle, IEEE Trans. Image Process. 18, 2419 (2009), 10.1109/TIP.2009.2028250.
+            [Beck2009b] Beck and Teboulle, IEEE Trans. Image Process. 18, 2419 (2009), 10.1109/TIP.2009.2028250.
         """
         image = np.asarray(image, dtype=float)
         largest_gap = ROUNDING * (norm(image) ** 2 / 2 + step * float(np.abs(image).sum()))

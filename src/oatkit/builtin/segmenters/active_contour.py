@@ -32,10 +32,10 @@ class ActiveContour(Segmenter):
     hollows that no ray from the centre sees. Where much less of it ends on a visible wall than of the radial path, that
     path is returned, and a note says so.
 
-    .. [Kass1988] M. Kass, A. Witkin, D. Terzopoulos, "Snakes: active contour models", Int. J. Comput. Vis. 1, 321
-       (1988).
-    .. [Amini1990] A. A. Amini, T. E. Weymouth, R. C. Jain, "Using dynamic programming for solving variational problems
-       in vision", IEEE Trans. Pattern Anal. Mach. Intell. 12, 855 (1990).
+    References:
+        [Kass1988] Kass, Witkin and Terzopoulos, Int. J. Comput. Vis. 1, 321 (1988), 10.1007/BF00133570.
+        [Amini1990] Amini, Weymouth and Jain, IEEE Trans. Pattern Anal. Mach. Intell. 12, 855 (1990), 10.1109/34.57681.
+        [Prakash2019] Prakash et al., IEEE Trans. Biomed. Eng. (2019), 10.1109/TBME.2019.2892842.
     """
 
     name: ClassVar[str] = "active-contour"

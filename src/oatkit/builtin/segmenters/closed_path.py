@@ -14,7 +14,8 @@ def cheapest_closed_path(cost: np.ndarray, bending: float, max_step: int) -> np.
     ones from below, and the closed path through one column lies between those through its neighbours, since a convex
     price of steps makes crossing paths no cheaper than uncrossed ones.
 
-    .. [Sun2003] C. Sun, S. Pallottino, "Circular shortest path in images", Pattern Recognition 36, 709 (2003).
+    References:
+        [Sun2003] Sun and Pallottino, Pattern Recognition 36, 709 (2003), 10.1016/S0031-3203(02)00085-7.
     """
     # Where few columns come near the best one, few starts have to be tried.
     best, usual = cost.min(axis=1, keepdims=True), np.median(cost, axis=1, keepdims=True)

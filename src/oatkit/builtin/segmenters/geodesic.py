@@ -23,8 +23,9 @@ class Geodesic(Segmenter):
     is outlined and moved once to the steepest slope within 0.4 mm, as the other segmenters do. Where noise
     interrupts the wall it leaks inwards, and it cuts off what is thinner than about 0.5 mm over a bright vessel.
 
-    .. [Marquez2014] P. Marquez-Neila, L. Baumela, L. Alvarez, "A morphological approach to curvature-based evolution of
-       curves and surfaces", IEEE Trans. Pattern Anal. Mach. Intell. 36, 2 (2014).
+    References:
+        [Marquez2014] Marquez-Neila, Baumela and Alvarez, IEEE Trans. Pattern Anal. Mach. Intell. 36, 2 (2014),
+        10.1109/TPAMI.2013.106.
     """
 
     name: ClassVar[str] = "geodesic"

@@ -18,10 +18,13 @@ class Radial(Segmenter):
     """Follows the outermost wall along rays from the centre of the body, by dynamic programming.
 
     The slope of the smoothed image is sampled on 360 rays at a quarter of a pixel; of all closed paths in these polar
-    coordinates the cheapest is taken (see `Strip.wall`), refined below a step and smoothed. The wall lies where the
-    image, not its logarithm, rises most: for a sharp edge in a band-limited image this is the edge itself. The body
-    must be star-shaped: each ray from its centroid leaves it once. Where it is not, the path bridges the hollow; a
-    note then says how much of the contour lies on no wall and names the way out.
+    coordinates the cheapest is taken [Sun2003]_ (see `Strip.wall`), refined below a step and smoothed. The wall lies
+    where the image, not its logarithm, rises most: for a sharp edge in a band-limited image this is the edge itself.
+    The body must be star-shaped: each ray from its centroid leaves it once. Where it is not, the path bridges the
+    hollow; a note then says how much of the contour lies on no wall and names the way out.
+
+    References:
+        [Sun2003] Sun and Pallottino, Pattern Recognition 36, 709 (2003), 10.1016/S0031-3203(02)00085-7.
     """
 
     name: ClassVar[str] = "radial"

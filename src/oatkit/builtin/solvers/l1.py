@@ -20,6 +20,7 @@ class L1Solver(SparseSolver):
     """
 
     name: ClassVar[str] = "l1"
+    on_stand_in: ClassVar[bool] = False
     regularizer: L1 = param(L1(), "the basis in which the image is to be sparse")
 
     def analysis(self) -> Analysis:

@@ -18,6 +18,9 @@ BLUR_PX = 1.5
 FLOOR = 0.03
 """What is added to it, relative to x_ref."""
 
+DARKEST = 1e-3
+"""Least of a pixel of an image that is begun with, relative to x_ref: a darker one is lit in many steps only."""
+
 FINE = 1e-8
 """An image is right to about the square root of its gap. Who asks for a gap of this or less wants the digits of the
 image: steps go on to the power 1.5 of the tolerance, which are few where Newton's method converges quadratically."""
@@ -105,11 +108,18 @@ def structural_prior(reference: Reference) -> np.ndarray:
 
 
 def _start(objective: Objective) -> np.ndarray:
-    """Return z of the base image with its dark pixels lifted to the floor; 0 where there is no base image."""
-    reference = objective.problem.reference
-    if reference.level == 0:
+    """Return z of the image to begin with; 0 where nothing sets its scale.
+
+    That is the problem's own start, brought to the scale of the data, or the base image; dark pixels are lifted.
+    """
+    problem = objective.problem
+    level, prior = problem.reference.level, np.log(objective.prior)
+    if level == 0:
         return np.zeros_like(objective.prior)
-    return np.log(np.maximum(reference.base, FLOOR * reference.level)) - np.log(objective.prior)
+    brightest = 0.0 if problem.start is None else float(np.percentile(problem.start, 99))
+    if problem.start is None or not brightest > 0:
+        return np.log(np.maximum(problem.reference.base, FLOOR * level)) - prior
+    return np.log(np.maximum(problem.start * (level / brightest), DARKEST * level)) - prior
 
 
 def _scale(objective: Objective) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from oatkit.builtin.solvers.projected_gradient import projected_gradient
 from oatkit.builtin.solvers.quadratic import QuadraticSolver
 from oatkit.builtin.solvers.quadratic_objective import Objective, Point
 from oatkit.builtin.solvers.quasi_newton import quasi_newton
+from oatkit.builtin.solvers.stand_in import Model
 from oatkit.vectors import norm
 
 CHEAP_STEPS = 150
@@ -49,12 +50,12 @@ class Nnls(QuadraticSolver):
         first = norm(start.slope)
         if first == 0:
             reason = "the data are zero, or no image on this grid predicts anything of them"
-            yield replace(_iterate(start, 0, 1), converged=True, reason=reason)
+            yield replace(_iterate(start, 0), converged=True, reason=reason)
             return
-        yield _iterate(start, 0, 1)
-        for iteration, (point, products) in enumerate(islice(_points(start), self.n_iterations), 1):
+        yield _iterate(start, 0)
+        for iteration, point in enumerate(islice(_points(start), self.n_iterations), 1):
             left = point.left / first
-            state = _iterate(point, iteration, products)
+            state = _iterate(point, iteration)
             if left <= self.tolerance:
                 reason = f"the projected gradient fell to {left:.1e} of its start"
                 yield replace(state, converged=True, reason=reason)
@@ -66,33 +67,30 @@ class Nnls(QuadraticSolver):
             yield state
 
 
-def _points(start: Point) -> Iterator[tuple[Point, int]]:
-    """Yield points towards the optimum and the products so far, without end."""
-    point, products = start, 2  # for the start and the stand-in
+def _points(start: Point) -> Iterator[Point]:
+    """Yield points towards the optimum, each after one product, without end."""
+    point = start
     for point in quasi_newton(start, _on_stand_in):
-        products += 1
-        yield point, products
-    for further in projected_gradient(point):
-        products += 1
-        yield further, products
+        yield point
+    yield from projected_gradient(point)
 
 
-def _on_stand_in(problem: Problem, curvature: float, point: Point) -> np.ndarray:
+def _on_stand_in(model: Model, curvature: float, point: Point) -> np.ndarray:
     """Return the image that projected gradients reach on a stand-in."""
-    here = start = replace(point.objective, problem=problem, curvature=curvature).at(point.image)
+    here = start = replace(point.objective, problem=model, curvature=curvature).at(point.image)
     for step, here in enumerate(islice(projected_gradient(start), CHEAP_STEPS), 1):
         if step % STEPS_BETWEEN_CHECKS == 0 and here.left <= CHEAP_SHARE * start.left:
             break
     return here.image
 
 
-def _iterate(point: Point, iteration: int, products: int) -> Iterate:
+def _iterate(point: Point, iteration: int) -> Iterate:
     return Iterate(
         point.image,
         iteration,
         objective=point.residual_norm**2 + point.objective.weight * point.penalty,
         residual_norm=point.residual_norm,
         penalty=point.penalty,
-        products=products,
+        products=iteration + 1,
         details={"weight": point.objective.weight},
     )

@@ -28,12 +28,12 @@ class Step:
     image."""
 
 
-def proximal_gradient(start: Point, tolerance: float) -> Iterator[Step]:
+def proximal_gradient(start: Point, tolerance: float, dual: np.ndarray | None) -> Iterator[Step]:
     """Yield the steps of FISTA [Beck2009]_ towards the minimum of P, without end.
 
     Momentum is dropped where it points uphill [ODonoghue2015]_. One application of A^T A in a step: A x and A^T A x of
     the extrapolated point are extrapolated with it. Proximal points without closed form start from the dual variable
-    of the one before, and are sought as finely as the steps are long, or as `tolerance` asks.
+    of the one before (the first from `dual`), and are sought as finely as the steps are long, or as `tolerance` asks.
 
     References:
         [Beck2009] Beck and Teboulle, SIAM J. Imaging Sci. 2, 183 (2009), 10.1137/080716542.
@@ -41,7 +41,7 @@ def proximal_gradient(start: Point, tolerance: float) -> Iterator[Step]:
     """
     objective = start.objective
     previous = point = start
-    momentum, dual = 1.0, None
+    momentum, y = 1.0, None if dual is None else dual / (2 * objective.rate)
     moved = norm(point.slope) / objective.rate
     while True:
         following = (1 + np.sqrt(1 + 4 * momentum**2)) / 2
@@ -49,12 +49,22 @@ def proximal_gradient(start: Point, tolerance: float) -> Iterator[Step]:
         ahead = point.image + beta * (point.image - previous.image)
         slope = point.slope + beta * (point.slope - previous.slope)
         fine = max(INNER_SHARE * moved, tolerance * norm(point.image))
-        found = _proximal_point(objective, ahead - slope / objective.rate, fine, dual)
-        new, dual = objective.at(found.image), found.dual
+        found = _proximal_point(objective, ahead - slope / objective.rate, fine, y)
+        new, y = objective.at(found.image), found.dual
         uphill = inner(ahead - new.image, new.image - point.image) > 0
         previous, point, momentum = point, new, 1.0 if uphill else following
         moved = norm(new.image - ahead)
-        yield Step(point, 2 * objective.rate * dual, _relative(np.sqrt(moved**2 + 2 * found.gap), norm(new.image)))
+        yield Step(point, 2 * objective.rate * y, _relative(np.sqrt(moved**2 + 2 * found.gap), norm(new.image)))
+
+
+def judged(point: Point, tolerance: float, dual: np.ndarray | None) -> Step:
+    """Return a point as a step: with the dual variable and the length of the proximal gradient step from it."""
+    objective = point.objective
+    y = None if dual is None else dual / (2 * objective.rate)
+    size = norm(point.image)
+    found = _proximal_point(objective, point.image - point.slope / objective.rate, tolerance * size, y)
+    moved = norm(found.image - point.image)
+    return Step(point, 2 * objective.rate * found.dual, _relative(np.sqrt(moved**2 + 2 * found.gap), size))
 
 
 def _proximal_point(objective: Objective, image: np.ndarray, fine: float, dual: np.ndarray | None) -> Proximal:

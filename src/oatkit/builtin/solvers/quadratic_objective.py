@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,8 @@ SAFETY = 1.02
 class Objective:
     """P(x) = |A x - b|^2 + w |L x|^2."""
 
-    problem: Problem
+    problem: Any
+    """A `Problem`, or the `Model` of one."""
     regularizer: Quadratic
     weight: float
     """w."""

@@ -6,8 +6,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from oatkit.api import Problem
-from oatkit.builtin.solvers.stand_in import StandIn
+from oatkit.builtin.solvers.stand_in import Model, StandIn
 from oatkit.vectors import inner
 
 LEAST_FIT = 0.5
@@ -19,15 +18,23 @@ MOST_STEPS = 40
 
 
 class Point(Protocol):
-    """An image with what one application of A^T A tells about it: a frozen dataclass."""
+    """An image with what one application of A^T A tells about it: a frozen dataclass with these fields."""
 
-    objective: Any
-    """With its ``problem``, its ``weight``, and ``at(image)``, the point of another image by one product."""
-    image: np.ndarray
-    misfit: np.ndarray
-    """A x - b."""
-    slope: np.ndarray
-    """A^T (A x - b), of the shape of the image."""
+    @property
+    def objective(self) -> Any:
+        """With its ``problem``, its ``weight``, and ``at(image)``, the point of another image by one product."""
+
+    @property
+    def image(self) -> np.ndarray:
+        """Of the problem's shape."""
+
+    @property
+    def misfit(self) -> np.ndarray:
+        """A x - b."""
+
+    @property
+    def slope(self) -> np.ndarray:
+        """A^T (A x - b), of the shape of the image."""
 
     @property
     def penalty(self) -> float:
@@ -35,12 +42,12 @@ class Point(Protocol):
 
 
 P = TypeVar("P", bound=Point)
-Minimise = Callable[[Problem, float, P], np.ndarray]
-"""From a stand-in's problem, a bound on its curvature and the point so far: the image of least objective on it."""
+Minimise = Callable[[Model, float, P], np.ndarray]
+"""From a model of the problem, a bound on its curvature and the point so far: the image of least objective on it."""
 
 
 def quasi_newton(start: P, minimise: Minimise[P]) -> Iterator[P]:
-    """Yield points of ever smaller objective, after one product for the stand-in and one more for each point.
+    """Yield points of ever smaller objective, each after one product; the first is `start`, after that of the stand-in.
 
     Each step goes to the minimum of the objective in which the stand-in takes the place of A^T A, or part of the way
     there (a proximal quasi-Newton method [Lee2014]_). It ends where that leads no further down, or where the operator
@@ -50,19 +57,19 @@ def quasi_newton(start: P, minimise: Minimise[P]) -> Iterator[P]:
         [Lee2014] Lee, Sun and Saunders, SIAM J. Optim. 24, 1420 (2014), 10.1137/130921428.
     """
     stand_in = StandIn.of(start.objective.problem)
+    yield start
     if stand_in is None:
         return
     point = start
     for step in range(MOST_STEPS):
-        image = minimise(stand_in.problem(point.image, point.slope), stand_in.bound(), point)
+        image = minimise(Model.at(stand_in, point.image, point.slope), stand_in.bound(), point)
         aim = point.objective.at(image)
         move, change = aim.image - point.image, aim.slope - point.slope
         share = _share(point, aim, move, change)
-        fits = step > 0 or stand_in.fits(move, change) >= LEAST_FIT
-        stand_in.learn(move, change)
+        useful = stand_in.learn(move, change) >= LEAST_FIT or step > 0
         point = _between(point, aim, share) if share > 0 else point
         yield point
-        if share == 0 or not fits:
+        if share == 0 or not useful:
             return
 
 

@@ -4,13 +4,14 @@ from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from oatkit.api import Iterate, Problem, Solver, Weight, param
 from oatkit.builtin.regularizers.analysis import Analysis
-from oatkit.builtin.solvers.proximal_gradient import Step, proximal_gradient
+from oatkit.builtin.solvers.proximal_gradient import Step
+from oatkit.builtin.solvers.sparse_descent import descent
 from oatkit.builtin.solvers.sparse_objective import Objective, Point
 from oatkit.builtin.solvers.sparse_start import start
 from oatkit.vectors import norm
@@ -22,6 +23,8 @@ ROUNDING = 1e-14
 class SparseSolver(Solver):
     """A solver of min |A x - b|^2 + w |K x|_1, perhaps over x >= 0."""
 
+    on_stand_in: ClassVar[bool]
+    """Whether most steps are taken on a stand-in for A^T A."""
     weight: Weight = param(3e-4, "weight of the penalty, as `scaling` says", above=0)
     scaling: Literal["relative", "absolute"] = param(
         "relative", "weight in units of |A|^2 x_ref, or the w of the formula"
@@ -42,10 +45,10 @@ class SparseSolver(Solver):
         if problem.reference.level == 0:
             yield _nothing_to_see(problem)
             return
-        objective = Objective(problem, weight, self.analysis(), self.non_negative)
+        objective = Objective.of(problem, weight, self.analysis(), self.non_negative)
         best = _Best(start(objective))
         yield best.iterate(0)
-        steps = proximal_gradient(best.point, self.tolerance)
+        steps = descent(best.point, self.tolerance, self.on_stand_in)
         for iteration, step in enumerate(islice(steps, self.n_iterations), 1):
             best.see(step)
             converged = step.move <= self.tolerance

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,17 +19,20 @@ SAFETY = 1.01
 class Objective:
     """P(x) = |A x - b|^2 + w |K x|_1, perhaps over x >= 0."""
 
-    problem: Problem
+    problem: Any
+    """A `Problem`, or the `Model` of one."""
     weight: float
     """w."""
     analysis: Analysis
     """K."""
     non_negative: bool
+    rate: float
+    """A bound from above on the curvature of |A x - b|^2 / 2."""
 
-    @property
-    def rate(self) -> float:
-        """A bound from above on the curvature of |A x - b|^2 / 2."""
-        return SAFETY * self.problem.norm**2
+    @classmethod
+    def of(cls, problem: Problem, weight: float, analysis: Analysis, non_negative: bool) -> "Objective":
+        """Make one, with the bound from the norm of A."""
+        return cls(problem, weight, analysis, non_negative, SAFETY * problem.norm**2)
 
     def at(self, image: np.ndarray) -> "Point":
         """Return the point of an image, by one application of A^T A."""

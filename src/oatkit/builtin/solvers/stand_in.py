@@ -1,5 +1,6 @@
 """A stand-in for A^T A that costs next to nothing: a convolution, mended by what products with A^T A show."""
 
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -16,31 +17,28 @@ BLUR_BINS = 1.5
 edges of the image cause."""
 
 POWER_STEPS = 12
-"""Steps of the power iteration for the first bound on B, and then for each next one from where the last ended."""
+"""Steps of the power iteration for each bound on B, from where the last ended."""
 
 SAFETY = 1.1
 """Factor from its result to the bound."""
 
 
 class StandIn:
-    """B = J J^T near A^T A, and J^T as an operator, so that a method for any problem can be run on it as it is.
+    """B near A^T A.
 
     Inside a detector array A^T A is nearly shift-invariant, and then the answer to one pixel in the middle gives all of
-    it: B starts as the circular convolution with that answer, J as the one with the root of its spectrum. Each product
-    s -> y of A^T A mends B by the BFGS formula, so that y = B s, in the form that keeps the factor J [Dennis1996]_, as
-    sums of J0 and of outer products a v^T.
+    it: B starts as the circular convolution with that answer. Each product s -> y of A^T A mends it by the BFGS formula
+    [Nocedal2006]_, so that y = B s: B + y y^T / (y^T s) - B s s^T B / (s^T B s).
 
     References:
-        [Dennis1996] Dennis and Schnabel, Numerical Methods for Unconstrained Optimization and Nonlinear Equations,
-            SIAM (1996), Algorithm A9.4.2, 10.1137/1.9781611971200.
+        [Nocedal2006] Nocedal and Wright, Numerical Optimization, Springer (2006), Eq. 6.19, 10.1007/978-0-387-40065-5.
     """
 
-    def __init__(self, image_shape: tuple[int, int], root: np.ndarray) -> None:
-        self.image_shape, self.root = image_shape, root.astype(np.float32)
-        size = image_shape[0] * image_shape[1]
-        self.shape = (size, size)
-        self.a, self.v = np.empty((2, 0, size), np.float32)
-        self._leading = np.random.default_rng(0).standard_normal(size)
+    def __init__(self, shape: tuple[int, int], gains: np.ndarray) -> None:
+        self.shape, self.gains = shape, gains
+        size = shape[0] * shape[1]
+        self._rows, self._signs = np.empty((0, size)), np.empty(0)
+        self._leading = np.random.default_rng(0).standard_normal(shape)
 
     @classmethod
     def of(cls, problem: Problem) -> Self | None:
@@ -54,55 +52,54 @@ class StandIn:
         centred = np.roll(answer, (-middle[0], -middle[1]), axis=(0, 1))
         gains = gaussian_filter(fft.fft2(centred).real, BLUR_BINS, mode="wrap")[:, : problem.shape[1] // 2 + 1]
         largest = gains.max()
-        return cls(problem.shape, np.sqrt(np.maximum(gains, FLOOR * largest))) if largest > 0 else None
+        return cls(problem.shape, np.maximum(gains, FLOOR * largest)) if largest > 0 else None
 
-    def matvec(self, image: np.ndarray) -> np.ndarray:
-        """Return J^T x, raveled."""
-        x = np.ravel(image).astype(np.float32)
-        return self._convolved(x, self.root) + (self.a @ x) @ self.v
+    def apply(self, image: np.ndarray) -> np.ndarray:
+        """Return B x."""
+        mended = (self._signs * (self._rows @ image.ravel())) @ self._rows
+        return fft.irfft2(fft.rfft2(image) * self.gains, s=self.shape) + mended.reshape(self.shape)
 
-    def rmatvec(self, data: np.ndarray) -> np.ndarray:
-        """Return J z, raveled."""
-        z = np.ravel(data).astype(np.float32)
-        return self._convolved(z, self.root) + (self.v @ z) @ self.a
+    def learn(self, step: np.ndarray, change: np.ndarray) -> float:
+        """Mend B so that it maps `step` s to `change` A^T A s.
 
-    def problem(self, image: np.ndarray, slope: np.ndarray) -> Problem:
-        """Return the problem with the curvature B and, at `image`, the `slope` A^T (A x - b)."""
-        return Problem(self, self.matvec(image) - self._solved(slope.ravel()), self.image_shape)
-
-    def fits(self, step: np.ndarray, change: np.ndarray) -> float:
-        """Return the cosine between B s and `change` A^T A s for a `step` s: 1 where they point the same way."""
-        guess = self.rmatvec(self.matvec(step))
-        size = norm(guess) * norm(change)
-        return inner(guess, change) / size if size > 0 else 0.0
-
-    def learn(self, step: np.ndarray, change: np.ndarray) -> None:
-        """Mend B so that it maps `step` s to `change` A^T A s."""
-        s, y = step.ravel(), change.ravel()
-        z = self.matvec(s)
-        before, after = inner(z, z), inner(s, y)
-        if not after > 1e-12 * before > 0:
-            return
-        v = np.sqrt(after / before) * z
-        a = (y - self.rmatvec(v)) / inner(v, v)
-        self.a, self.v = (np.vstack(pair).astype(np.float32) for pair in ((self.a, a), (self.v, v)))
+        Return the cosine between that and what B has said before: 1 where they point the same way.
+        """
+        guess = self.apply(step)
+        before, after = inner(step, guess), inner(step, change)
+        fits = inner(guess, change) / (norm(guess) * norm(change) or 1.0)
+        if after > 1e-12 * before > 0:
+            pair = change.ravel() / np.sqrt(after), guess.ravel() / np.sqrt(before)
+            self._rows, self._signs = np.vstack([self._rows, *pair]), np.append(self._signs, [1.0, -1.0])
+        return fits
 
     def bound(self) -> float:
-        """Return a bound from above on the curvature of B."""
+        """Return a bound from above on the spectral norm of B."""
         for _ in range(POWER_STEPS):
-            self._leading = self.rmatvec(self.matvec(self._leading / norm(self._leading)))
+            self._leading = self.apply(self._leading / norm(self._leading))
         return SAFETY * norm(self._leading)
 
-    def _solved(self, slope: np.ndarray) -> np.ndarray:
-        """Return J^-1 of a raveled slope, by the Woodbury identity."""
-        inverse = 1 / self.root
-        alone = self._convolved(slope, inverse)
-        if not len(self.a):
-            return alone
-        carried = np.array([self._convolved(a, inverse) for a in self.a])
-        small = np.eye(len(self.a)) + self.v @ carried.T
-        return alone - np.linalg.solve(small, self.v @ alone) @ carried
 
-    def _convolved(self, values: np.ndarray, gains: np.ndarray) -> np.ndarray:
-        image = values.reshape(self.image_shape).astype(np.float32, copy=False)
-        return fft.irfft2(fft.rfft2(image) * gains, s=self.image_shape).ravel()
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What a method sees of a problem whose A^T A is replaced by B.
+
+    Its misfit *is* the slope B (x - x0) + A^T (A x0 - b), and its adjoint leaves it as it is: B has no factor that maps
+    images to data. So slopes are right, and residual norms mean nothing.
+    """
+
+    stand_in: StandIn
+    data: np.ndarray
+    """B x0 - A^T (A x0 - b)."""
+
+    @classmethod
+    def at(cls, stand_in: StandIn, image: np.ndarray, slope: np.ndarray) -> Self:
+        """Make the one that has the `slope` A^T (A x0 - b) at the `image` x0."""
+        return cls(stand_in, stand_in.apply(image) - slope)
+
+    def forward(self, image: np.ndarray) -> np.ndarray:
+        """Return B x."""
+        return self.stand_in.apply(image)
+
+    def adjoint(self, misfit: np.ndarray) -> np.ndarray:
+        """Return what it gets."""
+        return misfit

@@ -19,6 +19,7 @@ class TvSolver(SparseSolver):
     """
 
     name: ClassVar[str] = "tv"
+    on_stand_in: ClassVar[bool] = True
     weight: Weight = param(3e-3, "weight of the penalty, as `scaling` says", above=0)
 
     def analysis(self) -> Analysis:

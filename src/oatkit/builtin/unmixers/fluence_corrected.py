@@ -38,10 +38,9 @@ class FluenceCorrected(SpectralUnmixer):
     ``so2_sensitivity_scattering`` and ``so2_sensitivity_calibration`` show the change of so2 where mu_s', or K, is
     higher by the share `probe`; where K comes from the spectra, it is found anew for the higher mu_s'.
 
-    .. [Cox2006] B. T. Cox, S. R. Arridge, K. P. Koestli, P. C. Beard, Appl. Opt. 45, 1866 (2006),
-       doi:10.1364/AO.45.001866.
-    .. [Cox2009] B. T. Cox, S. R. Arridge, P. C. Beard, J. Opt. Soc. Am. A 26, 443 (2009),
-       doi:10.1364/JOSAA.26.000443.
+    References:
+        [Cox2006] Cox, Arridge, Koestli and Beard, Appl. Opt. 45, 1866 (2006), 10.1364/AO.45.001866.
+        [Cox2009] Cox, Arridge and Beard, J. Opt. Soc. Am. A 26, 443 (2009), 10.1364/JOSAA.26.000443.
     """
 
     name: ClassVar[str] = "fluence-corrected"

@@ -20,8 +20,8 @@ def nonnegative(matrix: np.ndarray, data: np.ndarray) -> np.ndarray:
     they obey the conditions of Karush, Kuhn and Tucker [Kim2011]_. Where columns depend on each other, the answer is
     one of many.
 
-    .. [Kim2011] J. Kim, H. Park, "Fast nonnegative matrix factorization: an active-set-like method and comparisons",
-       SIAM J. Sci. Comput. 33, 3261 (2011).
+    References:
+        [Kim2011] Kim and Park, SIAM J. Sci. Comput. 33, 3261 (2011), 10.1137/110821172.
     """
     size = np.linalg.norm(matrix, axis=0)
     scale = np.where(size > 0, size, 1)[:, None]
