@@ -43,7 +43,7 @@ class Point(Protocol):
 
 P = TypeVar("P", bound=Point)
 Minimise = Callable[[Model, float, P], np.ndarray]
-"""From a model of the problem, a bound on its curvature and the point so far: the image of least objective on it."""
+"""From a model of the problem, its curvature and the point so far: the image of least objective on it."""
 
 
 def quasi_newton(start: P, minimise: Minimise[P]) -> Iterator[P]:
@@ -62,7 +62,7 @@ def quasi_newton(start: P, minimise: Minimise[P]) -> Iterator[P]:
         return
     point = start
     for step in range(MOST_STEPS):
-        image = minimise(Model.at(stand_in, point.image, point.slope), stand_in.bound(), point)
+        image = minimise(Model.at(stand_in, point.image, point.slope), stand_in.curvature(), point)
         aim = point.objective.at(image)
         move, change = aim.image - point.image, aim.slope - point.slope
         share = _share(point, aim, move, change)

@@ -17,10 +17,10 @@ BLUR_BINS = 1.5
 edges of the image cause."""
 
 POWER_STEPS = 12
-"""Steps of the power iteration for each bound on B, from where the last ended."""
+"""Steps of the power iteration for each estimate of the norm of B, from where the last ended and what was learnt."""
 
-SAFETY = 1.1
-"""Factor from its result to the bound."""
+SAFETY = 1.3
+"""Factor by which the estimate is raised, since it comes from below."""
 
 
 class StandIn:
@@ -69,11 +69,15 @@ class StandIn:
         fits = inner(guess, change) / (norm(guess) * norm(change) or 1.0)
         if after > 1e-12 * before > 0:
             pair = change.ravel() / np.sqrt(after), guess.ravel() / np.sqrt(before)
+            self._leading = self._leading / norm(self._leading) + change / norm(change)
             self._rows, self._signs = np.vstack([self._rows, *pair]), np.append(self._signs, [1.0, -1.0])
         return fits
 
-    def bound(self) -> float:
-        """Return a bound from above on the spectral norm of B."""
+    def curvature(self) -> float:
+        """Return the spectral norm of B, estimated and raised.
+
+        Where it is too small all the same, steps that rely on it diverge, and the descent on B ends early.
+        """
         for _ in range(POWER_STEPS):
             self._leading = self.apply(self._leading / norm(self._leading))
         return SAFETY * norm(self._leading)
