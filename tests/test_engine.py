@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +12,7 @@ from oatkit import Memo, Pipeline, PluginError, SolverError, ValidationError, lo
 from oatkit.api import ForwardModel, Iterate, Problem, Segmenter, Solver, param
 from oatkit.data import Image
 from oatkit.events import StepDone, StepIterate
+from oatkit.provenance import versions
 from oatkit.rules import resolve
 from oatkit.simulate import disc, simulate_scan
 
@@ -313,3 +315,11 @@ def test_rules_may_run_anew_on_each_frame(small_scan, tmp_path):
         again = run(Pipeline.load("maxent", changes), scan, frame=index)
         assert again.pipeline["reconstruct"]["weight"] == weight
         assert (again["initial_pressure"].values == frame["initial_pressure"].values).all()
+
+
+def test_versions_know_the_package_of_a_penalty(monkeypatch):
+    """The version of a package is kept, too, where only the penalty within a solver comes from it."""
+    pipeline = Pipeline.load("lsqr")
+    entry = SimpleNamespace(cls=type(pipeline.reconstruct.regularizer), distribution="theirs", version="2.3")
+    monkeypatch.setattr("oatkit.provenance.installed", lambda: SimpleNamespace(entries=[entry]))
+    assert versions(pipeline)["theirs"] == "2.3"

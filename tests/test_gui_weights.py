@@ -69,7 +69,9 @@ def ran(session):
 
 @pytest.mark.parametrize("preset", ["maxent", "lsqr", "nnls"])
 def test_the_image_of_a_weight_is_that_of_a_run_with_it(two_colours, preset):
-    """After a weight is taken, a run that knows nothing of the sweep gives the image that was shown, to the bit."""
+    """After a weight is taken, a run that knows nothing of the sweep gives the image that was shown: to the bit, and
+    where maximum entropy begins near the wavelength before within the certificates of both.
+    """
     session = quick_session(two_colours, preset)
     session.go_to_frame(1)
     for wavelength_nm, plane in ((None, 1), (700.0, 0)):
@@ -79,7 +81,12 @@ def test_the_image_of_a_weight_is_that_of_a_run_with_it(two_colours, preset):
             assert session.pipeline.reconstruct.weight == sweep.tried[index].point.weight
             image = sweep.tried[index].image
             alone = oatkit.run(session.pipeline, two_colours, 1)["initial_pressure"]
-            assert (image.values[0] == alone.values[plane]).all()
+            if preset == "maxent" and plane > 0:
+                shown, found = (one.diagnostics["objective"][i] for one, i in ((image, 0), (alone, plane)))
+                gaps = image.diagnostics["relative_gap"][0], alone.diagnostics["relative_gap"][plane]
+                assert abs(shown - found) <= max(gaps) * max(shown, found)
+            else:
+                assert (image.values[0] == alone.values[plane]).all()
             assert image.wavelengths_nm == (alone.wavelengths_nm[plane],)
             assert image.history == alone.history
             assert (ran(session)[1]["initial_pressure"].values == alone.values).all()

@@ -11,13 +11,13 @@ PIXELS = 32
 """The most along a side."""
 
 
-def shrunk(of_table: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `Pipeline.of_table` as one that caps the pixels of the grid."""
+def shrunk(of_table: Callable[..., Any], most: int = PIXELS) -> Callable[..., Any]:
+    """Return `Pipeline.of_table` as one that caps the pixels along a side of the grid."""
 
     def small(table: Mapping[str, Any], origin: str = "pipeline", folder: Path = Path()) -> Pipeline:
         grid = table.get("grid", {})
-        pixels = grid.get("pixels", PIXELS)
-        return of_table({**table, "grid": {**grid, "pixels": min(pixels, PIXELS)}}, origin, folder)
+        pixels = grid.get("pixels", most)
+        return of_table({**table, "grid": {**grid, "pixels": min(pixels, most)}}, origin, folder)
 
     return small
 

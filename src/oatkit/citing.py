@@ -6,9 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from importlib.metadata import metadata
 
-from oatkit.api import Plugin
 from oatkit.bibliography import Reference, references
-from oatkit.parameters import Parameters
 from oatkit.pipeline import Pipeline
 from oatkit.spectra import CHROMOPHORES, TISSUES
 
@@ -62,7 +60,7 @@ def _distinct(used: dict[Reference, list[str]]) -> dict[Reference, list[str]]:
 
 def _parts(pipeline: Pipeline) -> Iterator[tuple[str, str]]:
     """Yield what a pipeline uses, and the text that says where it comes from."""
-    for plugin in _plugins(pipeline):
+    for plugin in pipeline.plugins():
         yield f"{plugin.kind.replace('_', ' ')} {plugin.name}", inspect.getdoc(type(plugin)) or ""
     if pipeline.scan.speed_of_sound_m_s == "focus":
         from oatkit.focus import metrics
@@ -73,17 +71,6 @@ def _parts(pipeline: Pipeline) -> Iterator[tuple[str, str]]:
     if pipeline.fluence is not None:
         yield from _optics(pipeline)
     yield from _chromophores(pipeline)
-
-
-def _plugins(table: Parameters) -> Iterator[Plugin]:
-    """Yield the plugins of a table and those that are their parts."""
-    for name in type(table).model_fields:
-        value = getattr(table, name)
-        for one in value if isinstance(value, tuple) else (value,):
-            if isinstance(one, Plugin):
-                yield one
-            if isinstance(one, Parameters):
-                yield from _plugins(one)
 
 
 def _absorption(passes: int) -> Iterator[tuple[str, str]]:

@@ -1,14 +1,14 @@
 """A pipeline: which plugin does each step, with which parameters, as a frozen value that reads and writes TOML."""
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
 import pydantic
 
-from oatkit.api import FluenceModel, ForwardModel, Preprocessor, Segmenter, Solver, Unmixer
+from oatkit.api import FluenceModel, ForwardModel, Plugin, Preprocessor, Segmenter, Solver, Unmixer
 from oatkit.errors import ValidationError
 from oatkit.names import did_you_mean
 from oatkit.parameters import Context, Parameters, param, problems
@@ -103,6 +103,10 @@ class Pipeline(Parameters):
         """Return the same pipeline with another solver."""
         return self.model_copy(update={"reconstruct": solver})
 
+    def plugins(self) -> Iterator[Plugin]:
+        """Yield the plugins of all steps, and those that are their parts: a solver's regularizer."""
+        return _plugins(self)
+
 
 def presets() -> dict[str, str]:
     """Return the text of each pipeline that ships with the package, by its name."""
@@ -194,6 +198,16 @@ def _where(path: str, table: Mapping[str, Any]) -> str:
         name = step.get("use", rest[0]) if isinstance(step, dict) else rest[0]
         head, rest = f"{head}.{name}", rest[1:]
     return f" [{head}]" + "".join(f".{key}" for key in rest)
+
+
+def _plugins(table: Parameters) -> Iterator[Plugin]:
+    for name in type(table).model_fields:
+        value = getattr(table, name)
+        for one in value if isinstance(value, tuple) else (value,):
+            if isinstance(one, Plugin):
+                yield one
+            if isinstance(one, Parameters):
+                yield from _plugins(one)
 
 
 def _without_none(table: Any) -> Any:

@@ -4,7 +4,6 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-from oatkit.api import Plugin
 from oatkit.pipeline import Pipeline
 from oatkit.registry import installed
 
@@ -14,15 +13,10 @@ LIBRARIES = ("oatkit", "numpy", "scipy", "numba", "scikit-image", "h5py", "zarr"
 
 def versions(pipeline: Pipeline) -> dict[str, str]:
     """Return the version of Python, the platform, each library, and each distribution with a plugin in `pipeline`."""
-    used = {type(step) for step in _plugins(pipeline)}
+    used = {type(step) for step in pipeline.plugins()}
     foreign = {e.distribution: e.version for e in installed().entries if e.cls in used}
     found = {name: known for name in LIBRARIES if (known := _version(name))}
     return {"python": platform.python_version(), "platform": platform.platform(), **foreign, **found}
-
-
-def _plugins(pipeline: Pipeline) -> list[Plugin]:
-    slots = (pipeline.forward, pipeline.reconstruct, pipeline.segment, pipeline.fluence, pipeline.unmix)
-    return [*pipeline.preprocess, *(step for step in slots if step is not None)]
 
 
 @cache  # a run over many frames asks for each

@@ -1,7 +1,7 @@
 """Links and navigation, from what the Markdown pages say: they are read on a plain git host, too.
 
 The lists of links on a page named ``index.md`` are its table of contents. A link to what lies outside of the
-documentation leads into the repository where `html_theme_options` knows its address, and is plain text where not.
+documentation leads into the repository where `oatkit_repository` says its address, and is plain text where not.
 """
 
 import os
