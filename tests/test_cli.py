@@ -141,6 +141,13 @@ def test_simulate_writes_the_frames_asked_for(tmp_path):
     assert list(read_truths(file)) == ["initial_pressure"]
 
 
+def test_simulate_refuses_the_name_of_another_format(tmp_path):
+    """A scan file under the ending of IPASC or MATLAB is not written."""
+    for name in ("scan.hdf5", "scan.mat"):
+        done = run_oatkit("simulate", "disc", "-o", str(tmp_path / name))
+        assert (done.returncode, ".h5" in done.stderr, (tmp_path / name).exists()) == (2, True, False)
+
+
 def test_simulate_oxygen_writes_scan_and_truths(tmp_path, monkeypatch):
     """Twelve wavelengths, and pressure, so2 and haemoglobin of the body of this seed, here in coarse light."""
     from functools import partial

@@ -190,6 +190,8 @@ def simulate(
     from oatkit.demo import simulated
     from oatkit.scanfile import write_scan
 
+    if output.suffix.lower() != ".h5":
+        raise ValidationError(f"{output}: the name must end in .h5; `oatkit convert` then writes other formats")
     check_new(output, overwrite)
     if phantom is Phantom.OXYGEN:
         scan, truths = _simulated_oxygen(snr, seed, frames)
