@@ -476,3 +476,12 @@ def test_the_example_of_the_page_is_read(tmp_path):
 def test_the_arc_of_the_page_is_the_default_array(tmp_path):
     """The table that docs/guides/formats.md shows is an MSOT256-TF."""
     assert detectors_of(tmp_path, 256, ARC_EXAMPLE) == arc_detectors()
+
+
+@pytest.mark.parametrize("name", ["signals.npy", "signals.TIF"])
+def test_an_array_alone_asks_for_its_description(tmp_path, name):
+    """Who opens the array itself is told of the description that is missing."""
+    np.save(tmp_path / "a.npy", np.ones((2, 3)))
+    (tmp_path / "a.npy").rename(tmp_path / name)
+    with pytest.raises(ReadError, match=r"write a small \.toml beside it"):
+        oatkit.read(tmp_path / name)

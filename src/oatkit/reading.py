@@ -65,6 +65,8 @@ def _unknown(path: Path) -> str:
         return "a result of a run, not a scan; `oatkit report`, `oatkit roi` and `oatkit export` take it"
     if path.is_dir():
         return "no installed reader knows this folder; name the file of the scan in it"
+    if path.suffix.lower() in (".npy", ".tif", ".tiff"):
+        return "an array without a description; write a small .toml beside it, as the page on file formats shows"
     empty = path.is_file() and not path.stat().st_size
     return "the file is empty" if empty else "no installed reader knows this file"
 

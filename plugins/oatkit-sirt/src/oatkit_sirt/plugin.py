@@ -12,8 +12,6 @@ from oatkit.api import Iterate, Problem, Solver, param
 class Sirt(Solver):
     """SIRT under x >= 0: x <- max(0, x + A^T R (b - A x) / |A^T R A|), where R divides by squared norms of rows of A.
 
-    No certificate.
-
     References:
         Hansen and Saxild-Hansen, J. Comput. Appl. Math. 236, 2167 (2012), 10.1016/j.cam.2011.09.039.
     """
@@ -40,10 +38,9 @@ class Sirt(Solver):
         for step in range(1, self.n_iterations + 1):
             before, image = image, np.maximum(image - adjoint(misfit) / largest, 0)
             misfit = forward(image) - weighted.data
-            move = np.linalg.norm(image - before) / (np.linalg.norm(image) or 1.0)
+            move, left = np.linalg.norm(image - before) / (np.linalg.norm(image) or 1), np.linalg.norm(misfit / root)
             converged, count = bool(move <= self.tolerance), spent + step
             told = f"step {step} moved the image by {move:.1e} of it" if converged or step == self.n_iterations else ""
-            residual = float(np.linalg.norm(misfit / root))
-            yield Iterate(image, step, float(misfit @ misfit), residual, 0.0, np.nan, count, converged, told)
+            yield Iterate(image, step, float(misfit @ misfit), float(left), 0.0, np.nan, count, converged, told)
             if converged:
                 return
