@@ -22,7 +22,7 @@ PAGE = ROOT / "docs" / "speed.md"
 PAIR = re.compile(
     r"(```sh\n(?P<command>[^`]*benchmarks/[^`]*)```\n(?:(?!```).)*?```(?:text)?\n)(?P<output>.*?)(```)", re.DOTALL
 )
-MACHINE = re.compile(r"Figures of one machine on one day \(.*?\)", re.DOTALL)
+MACHINE = re.compile(r"Figures of one machine .*?, as the commands", re.DOTALL)
 
 
 def main() -> None:
@@ -44,7 +44,7 @@ def main() -> None:
 
     text = PAIR.sub(renewed, PAGE.read_text())
     if not options.parts:
-        text = MACHINE.sub(f"Figures of one machine on one day ({machine()})", text)
+        text = MACHINE.sub(f"Figures of one machine on one day ({machine()}), as the commands", text)
     PAGE.write_text(text)
 
 

@@ -215,7 +215,7 @@ def _image(pipeline: Pipeline, wavelength_nm: float, last: Iterate, point: Curve
     solver = with_weight(pipeline.reconstruct, point.weight)
     with np.errstate(over="ignore"):
         values = np.asarray(last.image)[None].astype(np.float32)
-    names = ("iteration", "residual_norm", "penalty", "relative_gap", "converged", "reason")
+    names = ("iteration", "objective", "residual_norm", "penalty", "relative_gap", "converged", "reason")
     diagnostics = {name: (getattr(last, name),) for name in names}
     history = history_of(pipeline.with_solver(solver))
     made = Image(values, "initial_pressure", "a.u.", pipeline.grid.grid(), (wavelength_nm,), history, diagnostics)
