@@ -12,6 +12,7 @@ import resource
 import sys
 import time
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 
@@ -57,11 +58,8 @@ def main() -> None:
 
 def import_libraries() -> None:
     """Import what a first call would import."""
-    import numba
-    import scipy.ndimage
-    import scipy.special  # noqa: F401
-
-    assert numba.__version__
+    for library in ("numba", "scipy.ndimage", "scipy.special"):
+        import_module(library)
     for kind, name in (("forward_model", "arc"), ("solver", sys.argv[3])):
         plugin(kind, name)
 

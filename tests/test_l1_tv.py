@@ -18,7 +18,7 @@ from oatkit.builtin.regularizers.l1 import L1
 from oatkit.builtin.regularizers.tv import TotalVariation
 from oatkit.builtin.regularizers.wavelets import Wavelets
 from oatkit.builtin.solvers.l1 import L1Solver
-from oatkit.builtin.solvers.sparse_objective import Objective
+from oatkit.builtin.solvers.sparse_objective import SparseObjective
 from oatkit.builtin.solvers.sparse_start import start
 from oatkit.builtin.solvers.tv import TvSolver
 from oatkit.errors import ValidationError
@@ -148,7 +148,7 @@ def test_bound_holds_for_any_image_and_any_guess():
     for kind, analysis in {"pixel": Pixels(), "wavelet": WAVELET.analysis(), "tv": Gradient()}.items():
         for non_negative in (True, False):
             least = SOLVERS[kind](non_negative=non_negative, **FINE).solve(problem).objective
-            objective = Objective.of(problem, weight_of(problem), analysis, non_negative)
+            objective = SparseObjective.of(problem, weight_of(problem), analysis, non_negative)
             bounds = []
             for size in (0.1, 1.0, 10.0):
                 point = objective.at(abs(size * RNG.standard_normal(problem.shape)))
@@ -257,7 +257,7 @@ def test_start_fits_the_data_better_than_the_base_image():
 
     problem = small_circles()
     base = np.maximum(problem.reference.base, 0)
-    point = start(Objective.of(problem, 1.0, Pixels(), True))
+    point = start(SparseObjective.of(problem, 1.0, Pixels(), True))
     images = np.array([base.ravel(), gaussian_filter(base, 2.0).ravel()]).T
     assert point.residual_norm == pytest.approx(nnls(dense(problem) @ images, problem.data)[1], rel=1e-10)
     assert point.image.min() >= 0

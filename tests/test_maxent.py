@@ -11,7 +11,7 @@ from oatkit.api import Problem
 from oatkit.builtin.regularizers.entropy import Entropy
 from oatkit.builtin.solvers.maxent_newton import newton
 from oatkit.builtin.solvers.maxent_nlcg import MaxEntNlcg, structural_prior
-from oatkit.builtin.solvers.maxent_objective import Objective, certified, relative_entropy
+from oatkit.builtin.solvers.maxent_objective import EntropyObjective, certified, relative_entropy
 from oatkit.errors import ValidationError
 from small_problems import (
     PROBLEMS,
@@ -32,7 +32,7 @@ TAUS = [1e2, 1.0, 1e-1, 1e-2, 1e-3, 1e-4]
 def objective_of(problem, tau=1e-2, prior=0.1):
     """P of a problem at a dimensionless weight and flat prior."""
     level = problem.reference.level
-    return Objective(problem, tau * problem.norm**2 * level, np.full(problem.shape, prior * level))
+    return EntropyObjective(problem, tau * problem.norm**2 * level, np.full(problem.shape, prior * level))
 
 
 def run(points, objective, count):

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from oatkit.builtin.regularizers.entropy import log_prox
-from oatkit.builtin.solvers.maxent_objective import Objective, Point
+from oatkit.builtin.solvers.maxent_objective import EntropyObjective, EntropyPoint
 
 FIRST_TAU = 2e-3
 """Where the dimensionless weight starts if it is asked to be weaker."""
@@ -32,11 +32,11 @@ STEPS_BETWEEN = 2
 INNER_STEPS = 60
 """Largest number of conjugate gradient steps in a Newton step."""
 
-Steps = Generator[Point, None, Point]
+Steps = Generator[EntropyPoint, None, EntropyPoint]
 """Yields the newest point after every application of A^T A, and returns the last one."""
 
 
-def newton(objective: Objective, start: np.ndarray) -> Steps:
+def newton(objective: EntropyObjective, start: np.ndarray) -> Steps:
     """Yield points from z = `start` towards the optimum, without end."""
     problem, target = objective.problem, objective.weight
     weight = max(target, FIRST_TAU * problem.norm**2 * problem.reference.level)
@@ -54,7 +54,7 @@ def newton(objective: Objective, start: np.ndarray) -> Steps:
             first = _size(point)
 
 
-def _newton_step(point: Point, forcing: float, curvature: float) -> Steps:
+def _newton_step(point: EntropyPoint, forcing: float, curvature: float) -> Steps:
     """Take a Newton step as far as P falls, then accelerated ones."""
     change = yield from _direction(point, forcing, curvature)
     new = yield from _line_search(point, change)
@@ -63,7 +63,7 @@ def _newton_step(point: Point, forcing: float, curvature: float) -> Steps:
     return (yield from _accelerated(new, STEPS_BETWEEN))
 
 
-def _accelerated(point: Point, steps: int) -> Steps:
+def _accelerated(point: EntropyPoint, steps: int) -> Steps:
     """Take proximal gradient steps with momentum [Beck2009]_, which is dropped where P rises."""
     previous, momentum = point, 1.0
     for _ in range(steps):
@@ -78,7 +78,7 @@ def _accelerated(point: Point, steps: int) -> Steps:
     return point
 
 
-def _direction(point: Point, forcing: float, curvature: float) -> Generator[Point, None, np.ndarray]:
+def _direction(point: EntropyPoint, forcing: float, curvature: float) -> Generator[EntropyPoint, None, np.ndarray]:
     """Return the change of z that solves (w + 2 A^T A X) dz = -gradient, to a relative accuracy `forcing`.
 
     By conjugate gradients in the inner product <u, X v>, X = diag(x), in which that matrix is symmetric: nothing is
@@ -103,7 +103,7 @@ def _direction(point: Point, forcing: float, curvature: float) -> Generator[Poin
     return change
 
 
-def _line_search(point: Point, change: np.ndarray) -> Generator[Point, None, Point | None]:
+def _line_search(point: EntropyPoint, change: np.ndarray) -> Generator[EntropyPoint, None, EntropyPoint | None]:
     """Return a point along the Newton direction where P has fallen enough (Armijo), or None.
 
     The direction is taken in v = x + t z; see the top of this module.
@@ -121,17 +121,17 @@ def _line_search(point: Point, change: np.ndarray) -> Generator[Point, None, Poi
     return None
 
 
-def _size(point: Point) -> float:
+def _size(point: EntropyPoint) -> float:
     """How far from the optimum, in the norm that counts dark pixels for little."""
     return float(np.sqrt((point.image * point.gradient**2).sum()))
 
 
-def _mean_curvature(objective: Objective) -> float:
+def _mean_curvature(objective: EntropyObjective) -> float:
     """Estimate the mean of the diagonal of A^T A by one seeded probe of random signs [Hutchinson1990]_."""
     probe = np.random.default_rng(0).choice([-1.0, 1.0], objective.problem.shape)
     return float((objective.problem.forward(probe) ** 2).sum()) / probe.size
 
 
-def _reweighted(point: Point, weight: float) -> Point:
+def _reweighted(point: EntropyPoint, weight: float) -> EntropyPoint:
     """Return the same image as a point of the problem with another weight."""
     return replace(point, objective=replace(point.objective, weight=weight))

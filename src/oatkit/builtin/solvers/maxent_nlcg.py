@@ -8,7 +8,7 @@ import numpy as np
 
 from oatkit.api import Iterate, Problem, Reference, Solver, ValidationError, Weight, param
 from oatkit.builtin.solvers.maxent_newton import newton
-from oatkit.builtin.solvers.maxent_objective import ROUNDING, Objective, Point, certified
+from oatkit.builtin.solvers.maxent_objective import ROUNDING, EntropyObjective, EntropyPoint, certified
 from oatkit.builtin.solvers.maxent_paper import conjugate_gradients
 from oatkit.vectors import norm
 
@@ -68,7 +68,7 @@ class MaxEntNlcg(Solver):
             raise ValidationError(
                 f"maxent-nlcg: weight {weight:g} times prior {prior.max():g} leaves the range of floats"
             )
-        objective = Objective(problem, weight, prior)
+        objective = EntropyObjective(problem, weight, prior)
         about = {"prior_mean": float(prior.mean()), **_scale(objective)}
         goal = self.tolerance if self.tolerance > FINE else max(self.tolerance**1.5, ROUNDING)
         state = Iterate(np.zeros(problem.shape), 0)
@@ -85,7 +85,7 @@ class MaxEntNlcg(Solver):
             return structural_prior(problem.reference)
         return np.full(problem.shape, self.prior * (problem.reference.level if self.scaling == "relative" else 1.0))
 
-    def _points(self, objective: Objective) -> Iterator[Point]:
+    def _points(self, objective: EntropyObjective) -> Iterator[EntropyPoint]:
         if self.method == "paper":
             return conjugate_gradients(objective, np.zeros_like(objective.prior))
         return newton(objective, _start(objective))
@@ -107,7 +107,7 @@ def structural_prior(reference: Reference) -> np.ndarray:
     return gaussian_filter(np.maximum(reference.base, 0), BLUR_PX) + FLOOR * reference.level
 
 
-def _start(objective: Objective) -> np.ndarray:
+def _start(objective: EntropyObjective) -> np.ndarray:
     """Return z of the image to begin with; 0 where nothing sets its scale.
 
     That is the problem's own start, brought to the scale of the data, or the base image; dark pixels are lifted.
@@ -122,7 +122,7 @@ def _start(objective: Objective) -> np.ndarray:
     return np.log(np.maximum(problem.start * (level / brightest), DARKEST * level)) - prior
 
 
-def _scale(objective: Objective) -> dict[str, Any]:
+def _scale(objective: EntropyObjective) -> dict[str, Any]:
     """Return the weight as it stands in the formula, and the scale that makes it dimensionless."""
     problem = objective.problem
     unit = problem.norm**2 * problem.reference.level
@@ -134,13 +134,13 @@ def _scale(objective: Objective) -> dict[str, Any]:
     }
 
 
-def _iterate(point: Point, gap: float, iteration: int, about: dict[str, Any]) -> Iterate:
+def _iterate(point: EntropyPoint, gap: float, iteration: int, about: dict[str, Any]) -> Iterate:
     return Iterate(
         point.image,
         iteration,
         objective=point.value,
         residual_norm=point.residual_norm,
-        penalty=point.divergence,
+        penalty=point.penalty,
         relative_gap=gap,
         products=point.objective.problem.settling_products + iteration,
         details=about,

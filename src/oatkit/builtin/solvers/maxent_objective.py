@@ -8,6 +8,7 @@ import numpy as np
 
 from oatkit.api import Problem, SolverError
 from oatkit.builtin.regularizers.entropy import log_prox
+from oatkit.builtin.solvers.point import Point
 from oatkit.vectors import norm
 
 ROUNDING = 1e-14
@@ -15,7 +16,7 @@ ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
-class Objective:
+class EntropyObjective:
     """P(x) = |A x - b|^2 + w sum [x log(x / m) - x + m], strictly convex in x >= 0."""
 
     problem: Problem
@@ -24,12 +25,11 @@ class Objective:
     prior: np.ndarray
     """m > 0, of the shape of the image."""
 
-    def at(self, log_ratio: np.ndarray) -> "Point":
+    def at(self, log_ratio: np.ndarray) -> "EntropyPoint":
         """Return the point of z = log(x / m), by one application of A^T A. Raises `SolverError` if it is not finite."""
         with np.errstate(over="ignore"):
             image = self.prior * np.exp(log_ratio)
-        misfit = self.problem.forward(image) - self.problem.data
-        point = Point(self, log_ratio, image, misfit, self.problem.adjoint(misfit))
+        point = EntropyPoint.of(self, image, log_ratio=log_ratio)
         if not np.isfinite(point.value):
             raise SolverError(
                 f"maximum entropy: the objective left the range of floats at weight {self.weight:g} and a mean prior "
@@ -46,39 +46,22 @@ class Objective:
         """A bound on the curvature of |A x - b|^2 / 2; `Problem.norm` is a bound from below, at worst 2e-3 too low."""
         return 1.01 * self.problem.norm**2
 
-    def advance(self, image: np.ndarray, slope: np.ndarray) -> "Point":
+    def advance(self, image: np.ndarray, slope: np.ndarray) -> "EntropyPoint":
         """Return the point after one proximal gradient step from an image of that slope A^T (A x - b)."""
         return self.at(log_prox(image - slope / self.rate, self.weight / (2 * self.rate), self.prior))
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
-    """An image with all that one application of A^T A tells about it. Arrays are of the image's shape."""
+class EntropyPoint(Point):
+    """The point of `EntropyObjective`; its image is not negative."""
 
-    objective: Objective
     log_ratio: np.ndarray
     """z = log(x / m), finite even where x is too small for a float."""
-    image: np.ndarray
-    """x >= 0."""
-    misfit: np.ndarray
-    """A x - b, raveled."""
-    slope: np.ndarray
-    """A^T (A x - b)."""
 
     @cached_property
-    def residual_norm(self) -> float:
-        """|A x - b|."""
-        return norm(self.misfit)
-
-    @cached_property
-    def divergence(self) -> float:
+    def penalty(self) -> float:
         """The relative entropy of x to m."""
         return relative_entropy(self.image, self.log_ratio, self.objective.prior)
-
-    @property
-    def value(self) -> float:
-        """P(x)."""
-        return self.residual_norm * self.residual_norm + self.objective.weight * self.divergence
 
     @cached_property
     def gradient(self) -> np.ndarray:
@@ -98,7 +81,7 @@ class Point:
         return weight * relative_entropy(self.image, self.gradient / weight, np.exp(exponent))
 
 
-def certified(points: Iterator[Point], objective: Objective) -> Iterator[tuple[Point, float]]:
+def certified(points: Iterator[EntropyPoint], objective: EntropyObjective) -> Iterator[tuple[EntropyPoint, float]]:
     """Yield the point of least P so far and its relative gap, for each of `points`.
 
     The gap is relative to P or to |b|^2, whichever is smaller: a large flat prior adds a constant to P that would make

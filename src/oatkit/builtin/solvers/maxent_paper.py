@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from oatkit.builtin.solvers.maxent_objective import Objective, Point
+from oatkit.builtin.solvers.maxent_objective import EntropyObjective, EntropyPoint
 from oatkit.vectors import inner
 
 
-def conjugate_gradients(objective: Objective, start: np.ndarray) -> Generator[Point, None, Point]:
+def conjugate_gradients(objective: EntropyObjective, start: np.ndarray) -> Generator[EntropyPoint, None, EntropyPoint]:
     """Yield points of falling P from z = `start`, one for each application of A^T A, until P falls no more."""
     point = objective.at(start)
     yield point
@@ -39,7 +39,7 @@ def conjugate_gradients(objective: Objective, start: np.ndarray) -> Generator[Po
         point = new
 
 
-def _step(point: Point, direction: np.ndarray, curvature: float, slope: float) -> float:
+def _step(point: EntropyPoint, direction: np.ndarray, curvature: float, slope: float) -> float:
     """Return the root of Phi(alpha), the slope of P along the direction; it rises throughout."""
     from scipy.optimize import brentq
 
@@ -56,7 +56,9 @@ def _step(point: Point, direction: np.ndarray, curvature: float, slope: float) -
     return float(brentq(phi, 0, highest, xtol=1e-15 * highest, rtol=1e-12)) if phi(highest) > 0 else highest
 
 
-def _moved(point: Point, step: float, direction: np.ndarray, predicted: np.ndarray, curved: np.ndarray) -> Point:
+def _moved(
+    point: EntropyPoint, step: float, direction: np.ndarray, predicted: np.ndarray, curved: np.ndarray
+) -> EntropyPoint:
     """Return the point at x + step p; everything but the logarithm is affine, so it costs no further product."""
     return replace(
         point,

@@ -10,7 +10,7 @@ import numpy as np
 from oatkit.api import Iterate, Problem, param
 from oatkit.builtin.solvers.projected_gradient import projected_gradient
 from oatkit.builtin.solvers.quadratic import QuadraticSolver
-from oatkit.builtin.solvers.quadratic_objective import Objective, Point
+from oatkit.builtin.solvers.quadratic_objective import QuadraticObjective, QuadraticPoint
 from oatkit.builtin.solvers.quasi_newton import quasi_newton
 from oatkit.builtin.solvers.stand_in import Model
 from oatkit.vectors import norm
@@ -45,7 +45,7 @@ class Nnls(QuadraticSolver):
 
     def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:
         """Yield the iterates of the quasi-Newton method, then of FISTA."""
-        objective = Objective.of(problem, self.regularizer, weight)
+        objective = QuadraticObjective.of(problem, self.regularizer, weight)
         start = objective.at(np.zeros(problem.shape))
         first = norm(start.slope)
         if first == 0:
@@ -67,7 +67,7 @@ class Nnls(QuadraticSolver):
             yield state
 
 
-def _points(start: Point) -> Iterator[Point]:
+def _points(start: QuadraticPoint) -> Iterator[QuadraticPoint]:
     """Yield points towards the optimum, each after one product, without end."""
     point = start
     for point in quasi_newton(start, _on_stand_in):
@@ -75,7 +75,7 @@ def _points(start: Point) -> Iterator[Point]:
     yield from projected_gradient(point)
 
 
-def _on_stand_in(model: Model, curvature: float, point: Point) -> np.ndarray:
+def _on_stand_in(model: Model, curvature: float, point: QuadraticPoint) -> np.ndarray:
     """Return the image that projected gradients reach on a stand-in."""
     here = start = replace(point.objective, problem=model, curvature=curvature).at(point.image)
     for step, here in enumerate(islice(projected_gradient(start), CHEAP_STEPS), 1):
@@ -84,11 +84,11 @@ def _on_stand_in(model: Model, curvature: float, point: Point) -> np.ndarray:
     return here.image
 
 
-def _iterate(point: Point, iteration: int) -> Iterate:
+def _iterate(point: QuadraticPoint, iteration: int) -> Iterate:
     return Iterate(
         point.image,
         iteration,
-        objective=point.residual_norm**2 + point.objective.weight * point.penalty,
+        objective=point.value,
         residual_norm=point.residual_norm,
         penalty=point.penalty,
         products=iteration + 1,

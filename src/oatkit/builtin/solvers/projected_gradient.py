@@ -4,11 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from oatkit.builtin.solvers.quadratic_objective import Point
+from oatkit.builtin.solvers.quadratic_objective import QuadraticPoint
 from oatkit.vectors import inner
 
 
-def projected_gradient(start: Point) -> Iterator[Point]:
+def projected_gradient(start: QuadraticPoint) -> Iterator[QuadraticPoint]:
     """Yield the points of FISTA [Beck2009]_ towards the least objective over x >= 0, without end.
 
     Momentum is dropped where it points uphill [ODonoghue2015]_. One application of A^T A in a step: A^T A x of the

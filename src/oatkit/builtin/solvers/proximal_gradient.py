@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from oatkit.builtin.regularizers.dual_prox import Proximal, proximal
-from oatkit.builtin.solvers.sparse_objective import Objective, Point
+from oatkit.builtin.solvers.sparse_objective import SparseObjective, SparsePoint
 from oatkit.vectors import inner, norm
 
 INNER_STEPS = 1000
@@ -20,7 +20,7 @@ INNER_SHARE = 0.5
 class Step:
     """One step of the method."""
 
-    point: Point
+    point: SparsePoint
     dual: np.ndarray
     """y with magnitudes up to w of the proximal point."""
     move: float
@@ -28,7 +28,7 @@ class Step:
     image."""
 
 
-def proximal_gradient(start: Point, tolerance: float, dual: np.ndarray | None) -> Iterator[Step]:
+def proximal_gradient(start: SparsePoint, tolerance: float, dual: np.ndarray | None) -> Iterator[Step]:
     """Yield the steps of FISTA [Beck2009]_ towards the minimum of P, without end.
 
     Momentum is dropped where it points uphill [ODonoghue2015]_. One application of A^T A in a step: A x and A^T A x of
@@ -57,7 +57,7 @@ def proximal_gradient(start: Point, tolerance: float, dual: np.ndarray | None) -
         yield Step(point, 2 * objective.rate * y, _relative(np.sqrt(moved**2 + 2 * found.gap), norm(new.image)))
 
 
-def judged(point: Point, tolerance: float, dual: np.ndarray | None) -> Step:
+def judged(point: SparsePoint, tolerance: float, dual: np.ndarray | None) -> Step:
     """Return a point as a step: with the dual variable and the length of the proximal gradient step from it."""
     objective = point.objective
     y = None if dual is None else dual / (2 * objective.rate)
@@ -67,7 +67,7 @@ def judged(point: Point, tolerance: float, dual: np.ndarray | None) -> Step:
     return Step(point, 2 * objective.rate * found.dual, _relative(np.sqrt(moved**2 + 2 * found.gap), size))
 
 
-def _proximal_point(objective: Objective, image: np.ndarray, fine: float, dual: np.ndarray | None) -> Proximal:
+def _proximal_point(objective: SparseObjective, image: np.ndarray, fine: float, dual: np.ndarray | None) -> Proximal:
     step = objective.weight / (2 * objective.rate)
     return proximal(objective.analysis, image, step, objective.non_negative, fine**2 / 2, INNER_STEPS, dual)
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from oatkit.api import Problem, Quadratic
+from oatkit.builtin.solvers.point import Point
 from oatkit.vectors import norm
 
 SAFETY = 1.02
@@ -14,12 +15,14 @@ SAFETY = 1.02
 
 
 @dataclass(frozen=True, eq=False)
-class Objective:
+class QuadraticObjective:
     """P(x) = |A x - b|^2 + w |L x|^2."""
 
     problem: Any
     """A `Problem`, or the `Model` of one."""
     regularizer: Quadratic
+    rows: Any
+    """L."""
     weight: float
     """w."""
     curvature: float
@@ -28,33 +31,25 @@ class Objective:
     """Likewise of |L x|^2 / 2."""
 
     @classmethod
-    def of(cls, problem: Problem, regularizer: Quadratic, weight: float) -> "Objective":
+    def of(cls, problem: Problem, regularizer: Quadratic, weight: float) -> "QuadraticObjective":
         """Make one, with bounds from the norms of A and L."""
         rows = regularizer.operator(problem.shape)
         roughest = Problem(rows, np.zeros(rows.shape[0]), problem.shape).norm
-        return cls(problem, regularizer, weight, SAFETY * problem.norm**2, SAFETY * roughest**2)
+        return cls(problem, regularizer, rows, weight, SAFETY * problem.norm**2, SAFETY * roughest**2)
 
     @property
     def rate(self) -> float:
         """A bound from above on the curvature of P / 2."""
         return self.curvature + self.weight * self.roughness
 
-    def at(self, image: np.ndarray) -> "Point":
+    def at(self, image: np.ndarray) -> "QuadraticPoint":
         """Return the point of an image, by one application of A^T A."""
-        misfit = self.problem.forward(image) - self.problem.data
-        return Point(self, image, misfit, self.problem.adjoint(misfit))
+        return QuadraticPoint.of(self, image)
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
-    """An image with all that one application of A^T A tells about it."""
-
-    objective: Objective
-    image: np.ndarray
-    misfit: np.ndarray
-    """A x - b, raveled."""
-    slope: np.ndarray
-    """A^T (A x - b), of the shape of the image."""
+class QuadraticPoint(Point):
+    """The point of `QuadraticObjective`."""
 
     @cached_property
     def penalty(self) -> float:
@@ -62,14 +57,9 @@ class Point:
         return self.objective.regularizer.value(self.image)
 
     @cached_property
-    def residual_norm(self) -> float:
-        """|A x - b|."""
-        return norm(self.misfit)
-
-    @cached_property
     def gradient(self) -> np.ndarray:
         """Half the gradient of P."""
-        rows = self.objective.regularizer.operator(self.image.shape)
+        rows = self.objective.rows
         rough = rows.rmatvec(rows.matvec(self.image.ravel())).reshape(self.image.shape)
         return self.slope + self.objective.weight * rough
 

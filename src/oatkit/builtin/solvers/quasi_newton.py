@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any, Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
+from oatkit.builtin.solvers.point import Point
 from oatkit.builtin.solvers.stand_in import Model, StandIn
 from oatkit.vectors import inner
 
@@ -15,30 +16,6 @@ nearly shift-invariant, and the stand-in of no use."""
 
 MOST_STEPS = 40
 """Most steps: by then a stand-in that is of use has brought the image to where other steps can go on."""
-
-
-class Point(Protocol):
-    """An image with what one application of A^T A tells about it: a frozen dataclass with these fields."""
-
-    @property
-    def objective(self) -> Any:
-        """With its ``problem``, its ``weight``, and ``at(image)``, the point of another image by one product."""
-
-    @property
-    def image(self) -> np.ndarray:
-        """Of the problem's shape."""
-
-    @property
-    def misfit(self) -> np.ndarray:
-        """A x - b."""
-
-    @property
-    def slope(self) -> np.ndarray:
-        """A^T (A x - b), of the shape of the image."""
-
-    @property
-    def penalty(self) -> float:
-        """The unweighted, convex penalty."""
 
 
 P = TypeVar("P", bound=Point)
@@ -91,4 +68,4 @@ def _between(point: P, aim: P, share: float) -> P:
         return aim
     names = ("image", "misfit", "slope")
     mixed = {name: (1 - share) * getattr(point, name) + share * getattr(aim, name) for name in names}
-    return replace(point, **mixed)  # type: ignore[type-var]
+    return replace(point, **mixed)

@@ -12,7 +12,7 @@ from oatkit.api import Iterate, Problem, Solver, Weight, param
 from oatkit.builtin.regularizers.analysis import Analysis
 from oatkit.builtin.solvers.proximal_gradient import Step
 from oatkit.builtin.solvers.sparse_descent import descent
-from oatkit.builtin.solvers.sparse_objective import Objective, Point
+from oatkit.builtin.solvers.sparse_objective import SparseObjective, SparsePoint
 from oatkit.builtin.solvers.sparse_start import start
 from oatkit.vectors import norm
 
@@ -45,7 +45,7 @@ class SparseSolver(Solver):
         if problem.reference.level == 0:
             yield _nothing_to_see(problem)
             return
-        objective = Objective.of(problem, weight, self.analysis(), self.non_negative)
+        objective = SparseObjective.of(problem, weight, self.analysis(), self.non_negative)
         best = _Best(start(objective))
         yield best.iterate(0)
         steps = descent(best.point, self.tolerance, self.on_stand_in)
@@ -62,7 +62,7 @@ class SparseSolver(Solver):
 class _Best:
     """The best point so far, and the best bound."""
 
-    def __init__(self, start: Point) -> None:
+    def __init__(self, start: SparsePoint) -> None:
         self.point, self.bound = start, 0.0
 
     def see(self, step: Step) -> None:
@@ -99,7 +99,7 @@ class _Best:
         )
 
 
-def _scale(objective: Objective) -> dict[str, Any]:
+def _scale(objective: SparseObjective) -> dict[str, Any]:
     """Return the weight as it stands in the formula, and the scale that makes it dimensionless."""
     problem = objective.problem
     return {"weight": objective.weight, "operator_norm": problem.norm, "x_ref": problem.reference.level}

@@ -8,7 +8,7 @@ import numpy as np
 
 from oatkit.builtin.solvers.proximal_gradient import Step, judged, proximal_gradient
 from oatkit.builtin.solvers.quasi_newton import quasi_newton
-from oatkit.builtin.solvers.sparse_objective import Point
+from oatkit.builtin.solvers.sparse_objective import SparsePoint
 from oatkit.builtin.solvers.stand_in import Model
 
 CHEAP_STEPS = 60
@@ -21,7 +21,7 @@ CHEAP_TOLERANCE = 1e-3
 """How finely their proximal points are sought, relative to the image."""
 
 
-def descent(start: Point, tolerance: float, on_stand_in: bool) -> Iterator[Step]:
+def descent(start: SparsePoint, tolerance: float, on_stand_in: bool) -> Iterator[Step]:
     """Yield steps towards the minimum of P, each after one application of A^T A, without end."""
     step = None
     if on_stand_in:
@@ -30,18 +30,19 @@ def descent(start: Point, tolerance: float, on_stand_in: bool) -> Iterator[Step]
     yield from proximal_gradient(step.point if step else start, tolerance, step.dual if step else None)
 
 
-def _on_stand_in(start: Point, tolerance: float) -> Iterator[Step]:
-    step = judged(start, tolerance, None)
+def _on_stand_in(start: SparsePoint, tolerance: float) -> Iterator[Step]:
+    dual: np.ndarray | None = None
 
-    def minimise(model: Model, curvature: float, point: Point) -> np.ndarray:
+    def minimise(model: Model, curvature: float, point: SparsePoint) -> np.ndarray:
         here = replace(point.objective, problem=model, rate=curvature).at(point.image)
         first = None
-        for cheap in islice(proximal_gradient(here, CHEAP_TOLERANCE, step.dual), CHEAP_STEPS):
+        for cheap in islice(proximal_gradient(here, CHEAP_TOLERANCE, dual), CHEAP_STEPS):
             first = cheap.move if first is None else first
             if cheap.move <= CHEAP_SHARE * first:
                 break
         return cheap.point.image
 
     for point in quasi_newton(start, minimise):
-        step = judged(point, tolerance, step.dual)
+        step = judged(point, tolerance, dual)
+        dual = step.dual
         yield step

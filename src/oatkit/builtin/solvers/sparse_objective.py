@@ -9,14 +9,15 @@ import numpy as np
 
 from oatkit.api import Problem
 from oatkit.builtin.regularizers.analysis import Analysis, magnitudes, positive_part
-from oatkit.vectors import inner, norm
+from oatkit.builtin.solvers.point import Point
+from oatkit.vectors import inner
 
 SAFETY = 1.01
 """`Problem.norm` is a bound from below, at worst 2e-3 too low; steps are shortened by this factor."""
 
 
 @dataclass(frozen=True, eq=False)
-class Objective:
+class SparseObjective:
     """P(x) = |A x - b|^2 + w |K x|_1, perhaps over x >= 0."""
 
     problem: Any
@@ -30,14 +31,13 @@ class Objective:
     """A bound from above on the curvature of |A x - b|^2 / 2."""
 
     @classmethod
-    def of(cls, problem: Problem, weight: float, analysis: Analysis, non_negative: bool) -> "Objective":
+    def of(cls, problem: Problem, weight: float, analysis: Analysis, non_negative: bool) -> "SparseObjective":
         """Make one, with the bound from the norm of A."""
         return cls(problem, weight, analysis, non_negative, SAFETY * problem.norm**2)
 
-    def at(self, image: np.ndarray) -> "Point":
+    def at(self, image: np.ndarray) -> "SparsePoint":
         """Return the point of an image, by one application of A^T A."""
-        misfit = self.problem.forward(image) - self.problem.data
-        return Point(self, image, misfit, self.problem.adjoint(misfit))
+        return SparsePoint.of(self, image)
 
     @cached_property
     def constant(self) -> tuple[np.ndarray, np.ndarray]:
@@ -52,30 +52,13 @@ class Objective:
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
-    """An image with all that one application of A^T A tells about it."""
-
-    objective: Objective
-    image: np.ndarray
-    misfit: np.ndarray
-    """A x - b, raveled."""
-    slope: np.ndarray
-    """A^T (A x - b), of the shape of the image."""
-
-    @cached_property
-    def residual_norm(self) -> float:
-        """|A x - b|."""
-        return norm(self.misfit)
+class SparsePoint(Point):
+    """The point of `SparseObjective`."""
 
     @cached_property
     def penalty(self) -> float:
         """|K x|_1."""
         return self.objective.analysis.value(self.image)
-
-    @property
-    def value(self) -> float:
-        """P(x); infinite where that is too large for a float."""
-        return self.residual_norm * self.residual_norm + self.objective.weight * self.penalty
 
     def bound(self, dual: np.ndarray) -> float:
         r"""Return a bound from below on the minimum of P, by Fenchel's dual.

@@ -3,14 +3,14 @@
 import numpy as np
 
 from oatkit.builtin.regularizers.analysis import positive_part
-from oatkit.builtin.solvers.sparse_objective import Objective, Point
+from oatkit.builtin.solvers.sparse_objective import SparseObjective, SparsePoint
 from oatkit.vectors import inner
 
 BLUR = 0.1
 """Standard deviation of the blurred image, relative to the shorter side."""
 
 
-def start(objective: Objective) -> Point:
+def start(objective: SparseObjective) -> SparsePoint:
     """Return the mix of the reference's base image and of its blurred copy that fits the data best.
 
     Under x >= 0 of its positive part, with no negative share. What the data tell least about is how bright the body is
@@ -25,7 +25,7 @@ def start(objective: Objective) -> Point:
     shares = _shares(signals, problem.data, non_negative)
     image, predicted = (shares[0] * pair[0] + shares[1] * pair[1] for pair in (images, signals))
     misfit = predicted - problem.data
-    return Point(objective, image, misfit, problem.adjoint(misfit))
+    return SparsePoint(objective, image, misfit, problem.adjoint(misfit))
 
 
 def _shares(signals: tuple[np.ndarray, ...], data: np.ndarray, non_negative: bool) -> np.ndarray:
