@@ -3,19 +3,17 @@
     python benchmarks/page.py --scan Scan_9.msot --patato .venv-patato [PART ...]
 
 A block of shell commands is followed by the block of its output. PART names commands by a part of their text; without
-one, all run, which takes about half an hour on two cores and wants a machine that does nothing else.
+one, all run, which takes long and wants a machine that does nothing else.
 """
 
 import argparse
 import datetime
-import os
-import platform
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-from operators import cpu_model
+from reconstruction import machine
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "speed.md"
@@ -44,7 +42,8 @@ def main() -> None:
 
     text = PAIR.sub(renewed, PAGE.read_text())
     if not options.parts:
-        text = MACHINE.sub(f"Figures of one machine on one day ({machine()}), as the commands", text)
+        today = datetime.date.today().isoformat()
+        text = MACHINE.sub(f"Figures of one machine on one day ({today}: {machine()}), as the commands", text)
     PAGE.write_text(text)
 
 
@@ -60,12 +59,6 @@ def ran(command: str, scan: str, venv: str) -> str:
     if done.returncode:
         sys.exit(f"{command} failed:\n{done.stderr[-2000:]}")
     return done.stdout
-
-
-def machine() -> str:
-    """Return date, processor and Python in words."""
-    today = datetime.date.today().isoformat()
-    return f"{today}: {cpu_model()}, {os.cpu_count()} cores, Python {platform.python_version()}"
 
 
 if __name__ == "__main__":

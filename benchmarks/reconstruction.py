@@ -21,6 +21,7 @@ import numpy as np
 
 from oatkit import Pipeline, read
 from oatkit.reconstruction import preprocess
+from operators import cpu_model
 
 HERE = Path(__file__).parent
 SOLVERS = ("lsqr", "nnls", "tv", "l1", "maxent-nlcg", "backprojection")
@@ -140,13 +141,8 @@ def peer_python(venv: Path) -> Path:
 
 
 def machine() -> str:
-    """Name processor and cores."""
-    model = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        names = [row.split(":")[1].strip() for row in info.read_text().splitlines() if row.startswith("model name")]
-        model = names[0] if names else model
-    return f"{model}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    """Name processor, cores and Python."""
+    return f"{cpu_model()}, {os.cpu_count()} cores, Python {platform.python_version()}"
 
 
 if __name__ == "__main__":
