@@ -16,7 +16,7 @@ import numpy as np
 from napari.qt import get_qapp
 from napari.utils.io import imsave
 
-from oatkit.demo_oxygen import CHANGES
+from oatkit.demo.oxygen import CHANGES
 from oatkit.gui.probe.panels import LINE, POINT
 from oatkit.gui.window import make_window
 from oatkit.gui.workbench import Workbench, workbench

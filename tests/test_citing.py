@@ -11,8 +11,8 @@ import pytest
 import oatkit
 from bibtex import parse
 from oatkit.api import Solver
-from oatkit.bibliography import dois, library, references
 from oatkit.citing import bibtex
+from oatkit.citing.bibliography import dois, library, references
 from oatkit.describe import plugin_text
 from oatkit.pipeline import presets
 from oatkit.registry import installed
@@ -103,7 +103,7 @@ def test_each_doi_has_one_entry_and_each_entry_is_used():
     assert used == {locator for locator in known if locator.startswith("10.")}
     sources = "\n".join(TEXTS.values())
     assert all(one.locator in sources for one in library())
-    assert len(parse((SOURCE / "references.bib").read_text())) == len(library())
+    assert len(parse((SOURCE / "citing" / "references.bib").read_text())) == len(library())
 
 
 def test_a_docstring_and_the_bibliography_say_the_same():
@@ -123,7 +123,7 @@ def test_a_docstring_and_the_bibliography_say_the_same():
 
 
 def _bibliography() -> str:
-    return (SOURCE / "references.bib").read_text()
+    return (SOURCE / "citing" / "references.bib").read_text()
 
 
 def test_a_key_in_a_plugin_is_explained_there():

@@ -11,9 +11,9 @@ import pytest
 from oatkit import Memo, Pipeline, PluginError, SolverError, ValidationError, load, plugin, run, run_frames, steps
 from oatkit.api import ForwardModel, Iterate, Problem, Segmenter, Solver, param
 from oatkit.data import Image
+from oatkit.engine.provenance import versions
+from oatkit.engine.rules import resolve
 from oatkit.events import StepDone, StepIterate
-from oatkit.provenance import versions
-from oatkit.rules import resolve
 from oatkit.simulate import disc, simulate_scan
 
 SMALL = ("grid.pixels=32", "grid.field_of_view_mm=9.0")
@@ -321,5 +321,5 @@ def test_versions_know_the_package_of_a_penalty(monkeypatch):
     """The version of a package is kept, too, where only the penalty within a solver comes from it."""
     pipeline = Pipeline.load("lsqr")
     entry = SimpleNamespace(cls=type(pipeline.reconstruct.regularizer), distribution="theirs", version="2.3")
-    monkeypatch.setattr("oatkit.provenance.installed", lambda: SimpleNamespace(entries=[entry]))
+    monkeypatch.setattr("oatkit.engine.provenance.installed", lambda: SimpleNamespace(entries=[entry]))
     assert versions(pipeline)["theirs"] == "2.3"

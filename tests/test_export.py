@@ -17,12 +17,12 @@ from PIL import Image as Picture
 
 from oatkit.atomic import new_file
 from oatkit.data import Grid, Image
+from oatkit.drawing.page import png
+from oatkit.drawing.sheet import MARGIN, WIDEST, Panel, scale_of, sheet
 from oatkit.errors import ResultError, ValidationError
 from oatkit.export import export
 from oatkit.figure import compare, image_figure, write_comparison
-from oatkit.page import png
 from oatkit.result import Result
-from oatkit.sheet import MARGIN, WIDEST, Panel, scale_of, sheet
 from results import GRID, WAVELENGTHS_NM, make_result, pressure, write_frames
 
 RED = (255, 0, 0)
@@ -297,7 +297,7 @@ def test_a_write_that_fails_leaves_what_was_there(tmp_path: Path, monkeypatch: p
 def test_without_matplotlib_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A figure without matplotlib is one sentence that says what to install; the other formats go on."""
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.delitem(sys.modules, "oatkit.page", raising=False)
+    monkeypatch.delitem(sys.modules, "oatkit.drawing.page", raising=False)
     monkeypatch.delitem(sys.modules, "oatkit.figure", raising=False)
     with pytest.raises(ResultError, match=r'pip install "oatkit\[report\]"'):
         export(make_result(), tmp_path / "out.png")
@@ -311,7 +311,7 @@ import sys
 import matplotlib
 before = dict(matplotlib.rcParams.copy())
 from oatkit.figure import compare
-from oatkit.page import png
+from oatkit.drawing.page import png
 from results import pressure
 png(compare([("a", pressure(), ())]))
 assert "matplotlib.pyplot" not in sys.modules

@@ -11,11 +11,11 @@ from scipy.stats import kurtosis
 import oatkit
 from oatkit import Geometry, Memo, Pipeline, plugin
 from oatkit.api import Detectors
+from oatkit.drawing.page import png
 from oatkit.errors import ValidationError
 from oatkit.focus import focus
 from oatkit.focus.figure import focus_figure
 from oatkit.focus.metrics import METRICS, TRUSTED
-from oatkit.page import png
 from oatkit.simulate import arc_detectors, msot_geometry, simulate_scan, star
 
 TRUE_M_S = 1507.3

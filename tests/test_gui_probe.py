@@ -20,6 +20,7 @@ from qtpy.QtWidgets import QApplication
 
 from oatkit import Grid, Image
 from oatkit.api import UnmixProblem
+from oatkit.drawing.plot import Curve, Plot
 from oatkit.errors import ValidationError
 from oatkit.gui.parts.plots import PlotView
 from oatkit.gui.probe.chromophore_fit import fit_spectrum
@@ -37,7 +38,6 @@ from oatkit.gui.probe.probe import (
 )
 from oatkit.gui.probe.profile import peak_lines, profile_csv, profile_plots, traces
 from oatkit.gui.probe.widget import NOTHING_SHOWN, ProbeWidget
-from oatkit.plot import Curve, Plot
 from oatkit.regions import EllipseRegion, PolygonRegion, RectangleRegion, region_table, save_regions
 from oatkit.registry import plugin
 from oatkit.result import Result

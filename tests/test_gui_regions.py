@@ -16,6 +16,7 @@ from qtpy.QtTest import QTest
 
 import results
 from oatkit import Image
+from oatkit.drawing.plot import ON_DARK
 from oatkit.errors import ValidationError
 from oatkit.gui.images.world import to_world
 from oatkit.gui.job import Cancelled
@@ -25,7 +26,6 @@ from oatkit.gui.regions.numbers import at_plane, live_rows, plots, shown_images,
 from oatkit.gui.regions.widget import RegionsWidget
 from oatkit.gui.workbench import workbench
 from oatkit.plain import encode
-from oatkit.plot import ON_DARK
 from oatkit.regions import EllipseRegion, MaskRegion, PolygonRegion, RectangleRegion, save_regions
 from oatkit.regions.table import COLUMNS, region_table
 from oatkit.store import load

@@ -60,7 +60,7 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
     assert inside == ours(ROOT / "src" / "oatkit")
     assert all(wheel.read(name) == (ROOT / "src" / name).read_bytes() for name in inside)
     expected = ("presets/maxent.toml", "spectra/icg.csv", "napari.yaml", "report/template.html.j2", "report/style.css")
-    more = ("report/script.js", "scaffold/templates/solver/plugin.py.txt", "py.typed", "references.bib")
+    more = ("report/script.js", "scaffold/templates/solver/plugin.py.txt", "py.typed", "citing/references.bib")
     assert {f"oatkit/{name}" for name in (*expected, *more)} <= inside
 
 

@@ -9,7 +9,9 @@ import pytest
 from matplotlib.image import imread
 
 from oatkit import Grid, Image, ResultError, ValidationError
-from oatkit.page import png
+from oatkit.drawing.page import png
+from oatkit.drawing.plot import MOST_INSIDE, Curve, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.paper import ranking
 from oatkit.paper.experiments import EXPERIMENTS
 from oatkit.paper.fig6 import low_share, magnitude
@@ -22,11 +24,9 @@ from oatkit.paper.setting import Setting
 from oatkit.paper.spectral import BELOW_SKIN_M, OFF_VESSELS_M, SpectralMouse, lowest_square
 from oatkit.paper.star import Star
 from oatkit.paper.sweep import sweep
-from oatkit.plot import MOST_INSIDE, Curve, Plot
 from oatkit.registry import installed
 from oatkit.scanfile import write_scan
 from oatkit.shapes import MaskRegion
-from oatkit.sheet import Panel, sheet
 from oatkit.simulate import OxygenBody, mouse_body
 
 SMALL = {"pixels": 48, "fine_pixels": 113, "detectors": 48, "per_decade": 1}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from oatkit.api import Iterate
+from oatkit.cli.progress import ProgressBar
 from oatkit.events import StepDone, StepIterate, StepStarted
-from oatkit.progress import ProgressBar
 
 
 class Terminal:

@@ -321,7 +321,7 @@ class TestSpectra:
 
     def test_a_name_from_a_file_is_shown_as_it_is(self):
         """No dollar makes a formula of it, and none breaks the figure."""
-        from oatkit.page import png
+        from oatkit.drawing.page import png
         from oatkit.regions.spectra import spectra_figure
 
         rows = region_table({"p": random_image()}, [replace(REGIONS[0], name=r"$\frac{ $x^")])

@@ -16,12 +16,12 @@ from PIL import Image as Picture
 from scipy.ndimage import uniform_filter
 
 from oatkit.data import Grid, Image
+from oatkit.drawing.sheet import scale_of
 from oatkit.errors import ResultError, ValidationError
 from oatkit.regions import EllipseRegion, MaskRegion, PolygonRegion, rim
 from oatkit.report import report_page, write_report
 from oatkit.report.ticks import linear, logarithmic, round_part
 from oatkit.result import Result
-from oatkit.sheet import scale_of
 from oatkit.store import load
 from packages import run_oatkit
 from results import GRID, WAVELENGTHS_NM, make_result, pressure, write_frames

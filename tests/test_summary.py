@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from oatkit.cli.summary import image_lines, summary
 from oatkit.data import Grid, Image
-from oatkit.summary import image_lines, summary
 from oatkit.words import plane_words
 from results import make_result
 

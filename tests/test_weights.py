@@ -9,10 +9,10 @@ import oatkit
 from oatkit import weights
 from oatkit.api import Detectors, Geometry, Problem
 from oatkit.checkpoint import at_checkpoints
+from oatkit.cli.progress import ProgressBar
 from oatkit.errors import PluginError, ValidationError
 from oatkit.events import StepStarted
 from oatkit.memo import Memo
-from oatkit.progress import ProgressBar
 from oatkit.weights import CANDIDATES, choose, l_curve_chord, l_curve_corner, resolve
 from small_problems import blurred, circles, dense
 

@@ -10,9 +10,9 @@ import pytest
 import oatkit
 from oatkit import Geometry, Image, Pipeline, Scan, plugin
 from oatkit.describe import scan_text
+from oatkit.engine.rules import motion_in
 from oatkit.errors import ValidationError
 from oatkit.memo import Memo
-from oatkit.rules import motion_in
 from oatkit.scanfile import write_scan
 from oatkit.simulate import arc_detectors, disc, simulate_scan
 from oatkit.spectra import chromophore

@@ -10,13 +10,13 @@ True
 from oatkit.batch import run_frames
 from oatkit.data import Detectors, Geometry, Grid, Image, Optics, Scan
 from oatkit.engine import run
+from oatkit.engine.stepping import steps
 from oatkit.errors import OatkitError, PluginError, ReadError, ResultError, SolverError, ValidationError
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.reading import read, read_images, read_regions
 from oatkit.registry import plugin
 from oatkit.result import Result
-from oatkit.stepping import steps
 from oatkit.store import load, verify
 
 __version__ = "0.1.0"

@@ -40,8 +40,8 @@ def export(result: Result | str | Path, file: str | Path, frame: int | None = No
 
 
 def _png(result: Result) -> bytes:
+    from oatkit.drawing.page import png
     from oatkit.figure import image_figure
-    from oatkit.page import png
 
     return png(image_figure(result))
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from oatkit.atomic import write_file
 from oatkit.data import Image
+from oatkit.drawing.page import Figure, png
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.errors import ValidationError
-from oatkit.page import Figure, png
 from oatkit.result import Result
-from oatkit.sheet import Panel, sheet
 from oatkit.words import counts_negatives, plane_words
 
 

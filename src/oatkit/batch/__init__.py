@@ -4,7 +4,8 @@ One frame with all its wavelengths is one piece of work, and one file for each o
 each other, so that the result is the same, bit by bit, whatever engine runs them, in whatever order.
 """
 
-from oatkit.batch.engines import Engine, engine_named
+from oatkit.batch.engine import Engine
+from oatkit.batch.engines import engine_named
 from oatkit.batch.joining import join, shard_of
 from oatkit.batch.running import run_frames
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 from uuid import uuid4
 
-from oatkit.batch.engines import IN_FLIGHT, Engine, Outcomes
+from oatkit.batch.engine import IN_FLIGHT, Engine, Outcomes
 from oatkit.batch.pieces import Outcome, Work, run_piece
 from oatkit.errors import SolverError, ValidationError
 from oatkit.events import Listener

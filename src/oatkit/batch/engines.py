@@ -1,29 +1,16 @@
 """Who runs the frames: this process, several on this machine, or a dask cluster."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from typing import Literal, get_args
 
-from oatkit.batch.pieces import Outcome, Work, run_piece
+from oatkit.batch.engine import Engine, Outcomes
+from oatkit.batch.pieces import Work, run_piece
 from oatkit.errors import ValidationError
 from oatkit.events import Listener
 from oatkit.memo import Memo
 from oatkit.names import did_you_mean
 
 Name = Literal["serial", "processes", "dask"]
-
-Outcomes = Generator[Outcome, None, None]
-
-IN_FLIGHT = 2
-"""Frames under way for each worker: one at work, one waiting. More would only fill memory."""
-
-
-class Engine(ABC):
-    """Runs frames, in any order, and yields what becomes of each exactly once."""
-
-    @abstractmethod
-    def run(self, work: Work, frames: Sequence[int], memo: Memo, on_event: Listener) -> Outcomes:
-        """Yield the outcome of each frame as it comes; closed early, it stops what is under way."""
 
 
 class Serial(Engine):

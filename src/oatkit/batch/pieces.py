@@ -5,12 +5,12 @@ from typing import Any
 
 from oatkit.data import Scan
 from oatkit.engine import run_resolved
+from oatkit.engine.rules import Resolved, resolve
 from oatkit.errors import OatkitError
 from oatkit.events import Listener, ignore
 from oatkit.memo import Memo
 from oatkit.reconstruction import frame_key
 from oatkit.result import Result
-from oatkit.rules import Resolved, resolve
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import active_children, get_context
 
-from oatkit.batch.engines import IN_FLIGHT, Engine, Outcomes
+from oatkit.batch.engine import IN_FLIGHT, Engine, Outcomes
 from oatkit.batch.pieces import Outcome, Work, run_piece
 from oatkit.errors import SolverError
 from oatkit.events import Listener

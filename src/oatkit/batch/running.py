@@ -6,17 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from oatkit.batch.engines import Engine, engine_named
+from oatkit.batch.engine import Engine
+from oatkit.batch.engines import engine_named
 from oatkit.batch.pieces import Outcome, Work
 from oatkit.data import Scan
+from oatkit.engine.provenance import versions
+from oatkit.engine.rules import Resolved, motion_in, resolve
 from oatkit.errors import OatkitError, ResultError, ValidationError
 from oatkit.events import Listener, ignore
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.plain import decode, encode
-from oatkit.provenance import versions
 from oatkit.result import Result
-from oatkit.rules import Resolved, motion_in, resolve
 from oatkit.store import StoreWriter, load
 
 

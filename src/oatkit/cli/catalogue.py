@@ -63,7 +63,7 @@ def plugins(
 
 
 def _check(name: str, seconds: float, as_json: bool) -> None:
-    from oatkit.trial import distributions_of, try_out
+    from oatkit.cli.trial import distributions_of, try_out
 
     trials = [try_out(distribution, seconds) for distribution in distributions_of(name)]
     if as_json:

@@ -87,7 +87,7 @@ def _of_body(rim_mm: float | None, core_mm: float | None) -> list[Any]:
 
 def _spectra(rows: Sequence[Any]) -> bytes:
     """Draw the spectra of the first frame in a table."""
-    from oatkit.page import png
+    from oatkit.drawing.page import png
     from oatkit.regions.spectra import spectra_figure  # matplotlib
 
     return png(spectra_figure([row for row in rows if row.frame == rows[0].frame]))

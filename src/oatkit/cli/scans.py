@@ -2,7 +2,6 @@
 
 import json
 import time
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +9,6 @@ from typing import Annotated, Any
 import typer
 
 from oatkit.cli.app import AsJson, Changes, Overwrite, ScanPath, check_new, command, complain, frames_in
-from oatkit.data import Image, Scan
 from oatkit.errors import SolverError, ValidationError
 
 
@@ -71,10 +69,10 @@ def run(
     The folder that is written also holds how they came about.
     """
     from oatkit.batch import engine_named, run_frames, shard_of
+    from oatkit.cli.progress import ProgressBar
+    from oatkit.cli.summary import summary
     from oatkit.pipeline import Pipeline
-    from oatkit.progress import ProgressBar
     from oatkit.reading import read
-    from oatkit.summary import summary
 
     start = time.perf_counter()
     loaded = Pipeline.load(pipeline, changes)
@@ -146,10 +144,10 @@ def focus(
 
     To use it: oatkit run --set scan.speed_of_sound_m_s=focus.
     """
+    from oatkit.cli.progress import ProgressBar
     from oatkit.describe import focus_text
     from oatkit.focus import focus as find
     from oatkit.pipeline import Pipeline
-    from oatkit.progress import ProgressBar
     from oatkit.reading import read
 
     if (lowest is None) != (highest is None):
@@ -187,14 +185,14 @@ def simulate(
 
     It is simulated on a finer grid than the one that reconstructs.
     """
-    from oatkit.demo import simulated
+    from oatkit.demo import simulated, simulated_oxygen
     from oatkit.scanfile import write_scan
 
     if output.suffix.lower() != ".h5":
         raise ValidationError(f"{output}: the name must end in .h5; `oatkit convert` then writes other formats")
     check_new(output, overwrite)
     if phantom is Phantom.OXYGEN:
-        scan, truths = _simulated_oxygen(snr, seed, frames)
+        scan, truths = simulated_oxygen(snr, seed, frames)
     else:
         scan, truth = simulated(phantom.value, snr, seed, frames)
         truths = [truth]
@@ -204,23 +202,6 @@ def simulate(
         # The preset is for scanners, whose light comes through water; K is 1 here, and found only without that.
         clear = "--set fluence.ring_radius="
         typer.echo(f"note: the water takes no light here: oatkit run multispectral {output} -o OUT.zarr {clear}")
-
-
-def _simulated_oxygen(snr_db: float, seed: int, frames: int) -> tuple[Scan, list[Image]]:
-    """Return a scan of a drawn body and, on the grid of the preset, its initial pressure, so2 and total haemoglobin."""
-    from oatkit.api import ForwardModel
-    from oatkit.pipeline import Pipeline
-    from oatkit.registry import plugin
-    from oatkit.simulate import OxygenBody, illuminate, oxygen_phantom, simulate_scan
-
-    arc = plugin("forward_model", "arc")()
-    assert isinstance(arc, ForwardModel)
-    body, grid = OxygenBody.draw(seed), Pipeline.load("multispectral").grid.grid()
-    lit = illuminate(body)  # by far the longest part, so once for signals and truth
-    scan = simulate_scan(oxygen_phantom(lit), arc, snr_db=snr_db, frames=frames, seed=seed)
-    note = f"the body of seed {seed} in water that takes no light, p0 = mu_a Phi in units of 1/m"
-    scan = replace(scan, notes=(*scan.notes, note))
-    return scan, [lit.pressure(grid), body.so2(grid), body.total_haemoglobin(grid)]
 
 
 @command
@@ -246,7 +227,7 @@ def convert(
 def _draw(drawn: Any, file: Path, as_json: bool, overwrite: bool) -> None:
     """Write a figure as a PNG file, and say so where it does not mix with JSON."""
     from oatkit.atomic import write_file
-    from oatkit.page import png
+    from oatkit.drawing.page import png
 
     write_file(file, png(drawn), overwrite)
     typer.echo(f"wrote {file}", err=as_json)

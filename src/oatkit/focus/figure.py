@@ -4,11 +4,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from oatkit.drawing.page import Figure
+from oatkit.drawing.plot import Curve, Mark, Plot
+from oatkit.drawing.sheet import sheet
 from oatkit.focus import Focus
 from oatkit.focus.metrics import TRUSTED
-from oatkit.page import Figure
-from oatkit.plot import Curve, Mark, Plot
-from oatkit.sheet import sheet
 
 
 def focus_figure(focus: Focus) -> Figure:

@@ -9,6 +9,7 @@ import numpy as np
 
 from oatkit.data import Image, Scan
 from oatkit.engine import run_resolved
+from oatkit.engine.rules import resolve
 from oatkit.errors import ValidationError
 from oatkit.events import Event, StepIterate
 from oatkit.gui.document import PipelineDocument
@@ -18,7 +19,6 @@ from oatkit.pipeline import Pipeline
 from oatkit.quantification import STEPS
 from oatkit.reading import read
 from oatkit.result import Result
-from oatkit.rules import resolve
 
 SLOTS = ("preprocess", "forward", "reconstruct", *STEPS)
 """The steps of a pipeline in their order."""

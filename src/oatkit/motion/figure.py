@@ -5,10 +5,10 @@ Importing this module needs matplotlib, the extra ``report``.
 
 import numpy as np
 
+from oatkit.drawing.page import Figure
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import sheet
 from oatkit.motion import Motion
-from oatkit.page import Figure
-from oatkit.plot import Curve, Plot
-from oatkit.sheet import sheet
 
 
 def motion_figure(motion: Motion) -> Figure:

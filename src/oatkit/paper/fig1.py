@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from oatkit.drawing.plot import Curve, Mark, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.metrics import negative_pixels, psnr, rmse, ssim
 from oatkit.paper.methods import L1, L2, L2_THRESHOLD, MAXENT, MAXENT_FLAT, NNLS, TV
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.simulated import lit, pipeline_for, problem_of, scan_of
 from oatkit.paper.sweep import Sweep, sweep
-from oatkit.plot import Curve, Mark, Plot
-from oatkit.sheet import Panel, sheet
 from oatkit.simulate import breast_body
 
 SETTING = Setting(pixels=256, fine_pixels=512)

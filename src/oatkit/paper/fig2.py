@@ -5,18 +5,18 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from oatkit.data import Grid, Image
+from oatkit.drawing.page import Figure
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.engine import run
 from oatkit.memo import Memo
 from oatkit.metrics import negative_pixels
-from oatkit.page import Figure
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.simulated import pipeline_for
 from oatkit.paper.star import AGAR_PER_CM, SCATTERING_PER_CM, TUBE_PER_CM, TUBES_M, Star
 from oatkit.pipeline import Pipeline
-from oatkit.plot import Curve, Plot
 from oatkit.result import Result
-from oatkit.sheet import Panel, sheet
 
 PRESETS = {"L2": "lsqr", "L2, thresholded": "lsqr-threshold", "MaxEnt": "maxent"}
 PASSES = 12

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from oatkit.data import Image
+from oatkit.drawing.plot import Curve, Mark, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.paper.methods import L2, MAXENT, MAXENT_FLAT
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.star import Star
 from oatkit.paper.sweep import Sweep, sweep
-from oatkit.plot import Curve, Mark, Plot
-from oatkit.sheet import Panel, sheet
 
 METHODS = (L2, MAXENT, MAXENT_FLAT)
 WHY = "the scale of the paper's operator, on which its weights depend, is not stated"

@@ -7,14 +7,14 @@ import numpy as np
 
 from oatkit.api import Iterate, Problem
 from oatkit.data import Image
+from oatkit.drawing.page import Figure
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.metrics import negative_pixels
-from oatkit.page import Figure
 from oatkit.paper.methods import Method
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.simulated import lit, pipeline_for, problem_of, scan_of
-from oatkit.plot import Curve, Plot
-from oatkit.sheet import Panel, sheet
 from oatkit.simulate import mouse_body
 from oatkit.vectors import norm
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from oatkit.data import Image
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.paper.chain import Mouse
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.result import Result
-from oatkit.sheet import Panel, sheet
 from oatkit.words import plane_words
 
 SHOWN = "shown without a number"

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from oatkit.data import Image
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.metrics import sharpness
 from oatkit.paper.chain import Mouse
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
-from oatkit.plot import Curve, Plot
 from oatkit.result import Result
-from oatkit.sheet import Panel, sheet
 
 PRESETS = {"L2, thresholded": "lsqr-threshold-absorption", "MaxEnt": "maxent-absorption"}
 LOW_PER_MM = 0.5

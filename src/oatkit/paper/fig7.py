@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from oatkit.data import Image
+from oatkit.drawing.page import Figure
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.metrics import negative_pixels
-from oatkit.page import Figure
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.spectral import SpectralMouse
-from oatkit.plot import Curve, Plot
 from oatkit.regions import Region, RegionRow, region_table
-from oatkit.sheet import Panel, sheet
 
 STEPS = 20
 """Of the least squares that are stopped early, as is usual: what is large is not filled by then."""

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.paper.methods import Method
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.star import Star
 from oatkit.paper.sweep import Sweep, sweep
-from oatkit.plot import Curve, Plot
-from oatkit.sheet import Panel, sheet
 
 RANGE = (1e-4, 10.0)
 METHODS = (

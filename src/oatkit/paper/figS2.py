@@ -3,14 +3,14 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.metrics import negative_pixels, ssim
 from oatkit.paper.methods import L1, L2, MAXENT, TV, Method
 from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.simulated import pipeline_for, problem_of, scan_of
 from oatkit.paper.sweep import Sweep, sweep
-from oatkit.plot import Curve, Plot
-from oatkit.sheet import Panel, sheet
 from oatkit.simulate import vessel
 
 METHODS = (

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from oatkit.atomic import write_file
-from oatkit.page import Figure, png
+from oatkit.drawing.page import Figure, png
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,15 @@ import numpy as np
 
 from oatkit.api import Problem
 from oatkit.data import Grid, Image
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import sheet
 from oatkit.errors import OatkitError
 from oatkit.metrics import negative_pixels, psnr, ssim
 from oatkit.paper.methods import L1, L2, L2_THRESHOLD, MAXENT, MAXENT_FLAT, NNLS, TV, Method
 from oatkit.paper.outcome import Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.simulated import Pressure, lit, pipeline_for, problem_of, scan_of
-from oatkit.plot import Curve, Plot
 from oatkit.registry import installed
-from oatkit.sheet import sheet
 from oatkit.simulate import Body, breast_body, disc_body, mouse_body, star_body, vessel
 from oatkit.weights import with_weight
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from oatkit.data import Image
+from oatkit.drawing.sheet import Panel, sheet
 from oatkit.engine import run
 from oatkit.metrics import negative_pixels, sharpness
 from oatkit.paper.chain import Mouse
@@ -13,7 +14,6 @@ from oatkit.paper.outcome import Beside, Outcome
 from oatkit.paper.setting import Setting
 from oatkit.paper.simulated import pipeline_for
 from oatkit.paper.star import Star
-from oatkit.sheet import Panel, sheet
 
 PRESETS = {"L2": "lsqr", "L2, thresholded": "lsqr-threshold", "MaxEnt": "maxent"}
 PAPER = {

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from oatkit.drawing.page import Figure
+from oatkit.drawing.plot import Curve, Plot
+from oatkit.drawing.sheet import sheet
 from oatkit.errors import ValidationError
 from oatkit.hostile import printable
-from oatkit.page import Figure
-from oatkit.plot import Curve, Plot
 from oatkit.regions.table import RegionRow, by_image
-from oatkit.sheet import sheet
 
 
 def spectra(rows: Sequence[RegionRow]) -> Iterator[tuple[str, str, tuple[Curve, ...]]]:

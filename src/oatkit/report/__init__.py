@@ -12,9 +12,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from oatkit.atomic import check_output, write_file
+from oatkit.drawing.page import PERCENTILE
+from oatkit.drawing.plot import COLOURS
 from oatkit.errors import ResultError, ValidationError
-from oatkit.page import PERCENTILE
-from oatkit.plot import COLOURS
 from oatkit.regions.table import RegionOf
 from oatkit.report.content import content_of
 from oatkit.result import Result

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from oatkit.plot import COLOURS, Curve, Plot
+from oatkit.drawing.plot import COLOURS, Curve, Plot
 from oatkit.report.ticks import Axis, linear, logarithmic
 
 WIDTH, HEIGHT = 380, 220

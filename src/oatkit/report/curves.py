@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from oatkit.data import Image
-from oatkit.plot import Curve, Mark, Plot
+from oatkit.drawing.plot import Curve, Mark, Plot
 from oatkit.report.charts import Chart, chart
 from oatkit.report.facts import is_number, numbers, plane_name, spaced
 from oatkit.result import Result

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from oatkit.data import Grid, Image
+from oatkit.drawing.sheet import scale_of
 from oatkit.regions import Region
 from oatkit.report.facts import plane_name, spaced, titled
 from oatkit.report.pictures import UNITS, Bar, Overlay, bar_of, overlay, plane_src
 from oatkit.report.ticks import plain
 from oatkit.report.verdict import negative_count, share_words
 from oatkit.result import Result
-from oatkit.sheet import scale_of
 from oatkit.words import FRACTIONS, counts_negatives, plane_words
 
 

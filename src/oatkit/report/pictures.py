@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from oatkit.data import Grid, Image
-from oatkit.page import Scale
+from oatkit.drawing.page import Scale
+from oatkit.drawing.sheet import Panel
 from oatkit.regions import Region
 from oatkit.report.ticks import Axis, linear, plain, round_part
-from oatkit.sheet import Panel
 
 UNITS = {"m": ("mm", 1e3)}
 """Units that are shown as others, and by how much values grow."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from oatkit.plot import Plot
+from oatkit.drawing.plot import Plot
 from oatkit.regions.spectra import spectra
 from oatkit.regions.table import RegionRow, by_image
 from oatkit.report.charts import Chart, chart

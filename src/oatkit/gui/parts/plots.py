@@ -9,8 +9,8 @@ import numpy as np
 from qtpy.QtCore import QTimer, Signal
 from qtpy.QtWidgets import QVBoxLayout, QWidget
 
+from oatkit.drawing.plot import ON_DARK, PRINT, Curve, Plot, Style, draw_curves, draw_lines
 from oatkit.gui.leaving import when_gone
-from oatkit.plot import ON_DARK, PRINT, Curve, Plot, Style, draw_curves, draw_lines
 
 NEAR = 14
 """How far from a point a click still means it, dots."""
@@ -28,7 +28,7 @@ REST_MS = 400
 
 
 class PlotView(QWidget):
-    """Shows `oatkit.plot.Plot`s above one another; drawn only while it is seen, so that a hidden dock costs nothing."""
+    """Shows plots (`oatkit.drawing.plot`) above one another, drawn only while seen: a hidden dock costs nothing."""
 
     picked = Signal(int, int, int)
     """A point was clicked: the number of its plot, of its curve there, and of the point on the curve."""
@@ -70,8 +70,8 @@ class PlotView(QWidget):
     def save(self, path: Path, title: str = "", caption: str = "") -> None:
         """Write the plots as a PNG on white. Raises `ResultError` where it cannot be written."""
         from oatkit.atomic import write_file
-        from oatkit.page import png
-        from oatkit.sheet import sheet
+        from oatkit.drawing.page import png
+        from oatkit.drawing.sheet import sheet
 
         write_file(path, png(sheet((), self.plots, title, caption)), overwrite=True)
 

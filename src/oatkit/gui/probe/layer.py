@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from psygnal import Signal
 
+from oatkit.drawing.plot import ON_DARK
 from oatkit.errors import ValidationError
 from oatkit.gui.images.layers import Layers
 from oatkit.gui.images.world import from_world
 from oatkit.gui.probe.probe import LIVE
 from oatkit.gui.regions.corners import region_of, shape_of
-from oatkit.plot import ON_DARK
 from oatkit.regions import EllipseRegion, Region
 from oatkit.regions.profile import Point
 

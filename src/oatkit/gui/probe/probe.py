@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from oatkit.data import Grid, Image
+from oatkit.drawing.plot import Curve, Plot
 from oatkit.errors import OatkitError
 from oatkit.gui.images.layers import BOUNDARY, KEY, Layers, image_of
 from oatkit.gui.probe.chromophore_fit import ChromophoreFit, fit_spectrum
-from oatkit.plot import Curve, Plot
 from oatkit.regions import MaskRegion, Region, RegionRow, region_table
 from oatkit.regions.spectra import spectra
 from oatkit.regions.table import by_image

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from oatkit.csv_cell import cell
+from oatkit.drawing.plot import Curve, Plot
 from oatkit.gui.probe.probe import Seen
-from oatkit.plot import Curve, Plot
 from oatkit.regions.profile import STEPS_PER_PIXEL, Peak, Point, highest_peak, line_profile
 
 

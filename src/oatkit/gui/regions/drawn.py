@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 from psygnal import Signal
 
+from oatkit.drawing.plot import ON_DARK
 from oatkit.errors import ValidationError
 from oatkit.gui.images.layers import Layers
 from oatkit.gui.regions.corners import region_of, shape_of
-from oatkit.plot import ON_DARK
 from oatkit.shapes import Region
 
 KEY = "regions"

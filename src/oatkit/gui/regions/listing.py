@@ -6,10 +6,10 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QColor, QIcon, QPixmap
 from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QTableWidget, QTableWidgetItem, QToolButton
 
+from oatkit.drawing.plot import ON_DARK
 from oatkit.errors import ValidationError
 from oatkit.gui.parts.forms import Message
 from oatkit.gui.regions.drawn import DrawnRegions
-from oatkit.plot import ON_DARK
 
 COLOUR, NAME, REMOVE = range(3)
 """Columns."""

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from oatkit.data import Grid, Image
+from oatkit.drawing.plot import Plot
 from oatkit.errors import ValidationError
 from oatkit.gui.images.layers import BOUNDARY, KEY, Layers
 from oatkit.gui.images.stored_planes import StoredPlanes
 from oatkit.gui.job import Job
 from oatkit.hostile import printable
-from oatkit.plot import Plot
 from oatkit.regions import MaskRegion, Region, RegionRow, region_rows, write_csv
 from oatkit.regions.spectra import spectra
 from oatkit.regions.table import by_image

@@ -18,6 +18,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from oatkit.drawing.plot import ON_DARK
 from oatkit.errors import OatkitError
 from oatkit.gui.job import Job
 from oatkit.gui.leaving import when_gone
@@ -32,7 +33,6 @@ from oatkit.gui.regions.numbers import Shown, at_plane, live_rows, plots, shown_
 from oatkit.gui.regions.row_table import RowTable
 from oatkit.gui.watching import watch
 from oatkit.gui.workbench import workbench
-from oatkit.plot import ON_DARK
 from oatkit.reading import read_regions
 from oatkit.regions import Region, RegionRow, load_regions, save_regions
 

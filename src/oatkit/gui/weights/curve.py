@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from oatkit.csv_cell import cell
+from oatkit.drawing.plot import Curve, Mark, Plot
 from oatkit.gui.weights.sweep import Tried, WeightSweep
 from oatkit.metrics import negative_pixels
 from oatkit.pipeline import Pipeline
-from oatkit.plot import Curve, Mark, Plot
 
 COLUMNS = (
     "solver", "frame", "wavelength_nm", "weight", "residual_norm", "penalty", "relative_gap", "converged",

@@ -9,6 +9,7 @@ import numpy as np
 
 from oatkit.api import Iterate, Problem, Solver
 from oatkit.data import Image, Scan
+from oatkit.engine.rules import frame_of_rules, remember_choice, with_speed
 from oatkit.errors import ValidationError
 from oatkit.events import Event, StepStarted
 from oatkit.gui.job import Job
@@ -16,7 +17,6 @@ from oatkit.gui.session import Session
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.reconstruction import check_finite, history_of, preprocess, problems, strongest
-from oatkit.rules import frame_of_rules, remember_choice, with_speed
 from oatkit.vectors import norm
 from oatkit.weights import CANDIDATES, Choice, CurvePoint, choose, weights_to_try, with_weight
 

@@ -3,31 +3,19 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from oatkit.api import ForwardModel
-from oatkit.data import Image, Scan
-from oatkit.demo_oxygen import oxygen_files, run_oxygen_demo
+from oatkit.data import Image
+from oatkit.demo.oxygen import oxygen_files, run_oxygen_demo
+from oatkit.demo.scans import simulated
 from oatkit.engine import run
 from oatkit.errors import ResultError, ValidationError
 from oatkit.memo import Memo
 from oatkit.metrics import negative_pixels, psnr, rmse, ssim
 from oatkit.pipeline import Pipeline
-from oatkit.registry import plugin
 
 METHODS = ("lsqr", "lsqr-threshold", "maxent")
 """The presets that the demo compares."""
 
 WHAT = "a breast-like phantom, 256 detectors on 270 degrees, SNR 32 dB over the samples that the image can reach"
-
-
-def simulated(phantom: str, snr_db: float, seed: int, frames: int = 1) -> tuple[Scan, Image]:
-    """Return a scan of a phantom and the truth on the grid of the presets; the simulating grid is a finer one."""
-    from oatkit.simulate import simulate_scan, truth
-
-    arc = plugin("forward_model", "arc")()
-    assert isinstance(arc, ForwardModel)
-    grid = Pipeline.load("maxent").grid.grid()
-    scan = simulate_scan(phantom, arc, snr_db=snr_db, frames=frames, seed=seed)
-    return scan, truth(phantom, grid)
 
 
 def run_demo(folder: Path, overwrite: bool = False) -> Iterator[str]:

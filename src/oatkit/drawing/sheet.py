@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from oatkit.data import Image
-from oatkit.page import BAR_WIDTH, PALE, PERCENTILE, Figure, Page, Scale
-from oatkit.plot import Plot, draw_plot
+from oatkit.drawing.page import BAR_WIDTH, PALE, PERCENTILE, Figure, Page, Scale
+from oatkit.drawing.plot import Plot, draw_plot
 from oatkit.words import FRACTIONS, SIGNED
 
 PANEL, MARGIN, GAP, TITLE, LINE = 640, 64, 48, 72, 44

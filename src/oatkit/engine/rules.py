@@ -7,8 +7,8 @@ from typing import Any
 
 from oatkit import weights
 from oatkit.api import Solver
-from oatkit.calibrating import asks_for_calibration, calibrate, calibrated
 from oatkit.data import Scan
+from oatkit.engine.calibrating import asks_for_calibration, calibrate, calibrated
 from oatkit.events import Listener, StepStarted, ignore
 from oatkit.focus import Focus, focus
 from oatkit.memo import Memo

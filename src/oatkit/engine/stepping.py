@@ -22,8 +22,8 @@ NUMBER = re.compile(r"[0-9.]+(e[+-]?[0-9]+)?")
 def steps(pipeline: Pipeline, scan: Scan, frame: int = 0, memo: Memo | None = None) -> Iterator[Event]:
     """Yield the events of running `pipeline` over one frame; close the generator to cancel.
 
-    Raises `ValidationError` where the weight is still the name of a rule (`oatkit.rules.resolve` replaces it) or a step
-    lacks one that it builds on, `PluginError` where a plugin fails or returns what it may not.
+    Raises `ValidationError` where the weight is still the name of a rule (`oatkit.engine.rules.resolve` replaces it) or
+    a step lacks one that it builds on, `PluginError` where a plugin fails or returns what it may not.
     """
     memo = Memo() if memo is None else memo
     pipeline.check_order()

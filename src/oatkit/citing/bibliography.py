@@ -30,7 +30,7 @@ class Reference:
 @cache
 def library() -> tuple[Reference, ...]:
     """Return the entries of `references.bib` as they stand there."""
-    text = files("oatkit").joinpath("references.bib").read_text(encoding="utf-8")
+    text = files("oatkit.citing").joinpath("references.bib").read_text(encoding="utf-8")
     entries = re.findall(r"^@\w+\{(\w+),\n(.*?)^\}", text, re.MULTILINE | re.DOTALL)
     whole = re.findall(r"^@.*?^\}", text, re.MULTILINE | re.DOTALL)
     return tuple(

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from importlib.metadata import metadata
 
-from oatkit.bibliography import Reference, references
+from oatkit.citing.bibliography import Reference, references
 from oatkit.pipeline import Pipeline
 from oatkit.spectra import CHROMOPHORES, TISSUES
 

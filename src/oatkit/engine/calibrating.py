@@ -2,13 +2,13 @@
 
 from oatkit.blame import blame
 from oatkit.data import Image, Scan
+from oatkit.engine.stepping import steps
 from oatkit.errors import ValidationError
 from oatkit.events import Listener, StepDone, StepStarted, ignore
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
 from oatkit.problem import Calibration
 from oatkit.quantification import unmix_problem
-from oatkit.stepping import steps
 
 
 def calibrate(pipeline: Pipeline, scan: Scan, frame: int, memo: Memo, on_event: Listener = ignore) -> Calibration:

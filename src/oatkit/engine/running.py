@@ -1,20 +1,20 @@
 """The one engine: it runs a pipeline over one frame, step by step.
 
-Script, command line and window all drain the same generator, `oatkit.stepping.steps`; so the same pipeline gives the
-same numbers everywhere.
+Script, command line and window all drain the same generator, `oatkit.engine.stepping.steps`; so the same
+pipeline gives the same numbers everywhere.
 """
 
 import math
 from typing import Any
 
 from oatkit.data import Image, Scan
+from oatkit.engine.provenance import versions
+from oatkit.engine.rules import Resolved, resolve
+from oatkit.engine.stepping import steps
 from oatkit.events import Listener, StepDone, ignore
 from oatkit.memo import Memo
 from oatkit.pipeline import Pipeline
-from oatkit.provenance import versions
 from oatkit.result import Result
-from oatkit.rules import Resolved, resolve
-from oatkit.stepping import steps
 
 
 def run(
@@ -22,15 +22,15 @@ def run(
 ) -> Result:
     """Run `pipeline` over one frame of `scan` and return its images, with how they came about.
 
-    Words that stand for numbers (see `oatkit.rules.resolve`) are replaced first. `on_event` is shown every event.
-    Raises an `OatkitError`.
+    Words that stand for numbers (see `oatkit.engine.rules.resolve`) are replaced first. `on_event` is shown every
+    event. Raises an `OatkitError`.
     """
     memo = Memo() if memo is None else memo
     return run_resolved(resolve(pipeline, scan, memo, on_event, frame), scan, frame, memo, on_event)
 
 
 def run_resolved(resolved: Resolved, scan: Scan, frame: int, memo: Memo, on_event: Listener) -> Result:
-    """Run a pipeline whose rules `oatkit.rules.resolve` has replaced."""
+    """Run a pipeline whose rules `oatkit.engine.rules.resolve` has replaced."""
     images: dict[str, Image] = {}
     seconds: dict[str, float] = {}
     choices = resolved.choices

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from oatkit.page import INK, PALE, Page
+from oatkit.drawing.page import INK, PALE, Page
 
 COLOURS = ("#0b6fa4", "#d1495b", "#2e8b57", "#b8860b", "#6a4c93", "#5c5c5c", "#e377c2", "#17becf")
 """Distinct on white, in print and to most colour-blind eyes."""

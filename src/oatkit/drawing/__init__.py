@@ -1,0 +1,1 @@
+"""Figures by matplotlib: a page, curves on it, and sheets of pictures and curves."""
