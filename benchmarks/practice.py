@@ -10,11 +10,12 @@ from oatkit.demo import simulated
 from oatkit.metrics import negative_pixels, psnr, ssim
 
 BAND = ("preprocess.band-pass.low=0.1", "preprocess.band-pass.high=7.0")
+STOPPED = ("reconstruct.n_iterations=20", "reconstruct.preconditioner=none")
 ROWS = (
     ("lsqr", "the preset", ()),
-    ("lsqr", "stopped after 20 steps", ("reconstruct.n_iterations=20",)),
+    ("lsqr", "stopped after 20 steps", STOPPED),
     ("lsqr", "0.1 .. 7 MHz", BAND),
-    ("lsqr", "0.1 .. 7 MHz, 20 steps", (*BAND, "reconstruct.n_iterations=20")),
+    ("lsqr", "0.1 .. 7 MHz, 20 steps", (*BAND, *STOPPED)),
     ("lsqr-threshold", "the preset", ()),
     ("nnls", "the preset", ()),
     ("maxent", "the preset", ()),

@@ -104,9 +104,11 @@ def test_products_count_every_application(cls, make, scaling):
 
 @pytest.mark.parametrize("cls", QUADRATIC, ids=named)
 def test_norm_is_sought_only_where_it_is_used(cls):
-    """With an absolute weight LSQR starts at once, and only `nnls`, whose steps need it, determines the norm."""
-    first = next(cls(scaling="absolute").iterate(circles()))
-    assert first.iteration == (0 if cls is Nnls else 1)
+    """With an absolute weight LSQR starts after the one product that makes its preconditioner, and only `nnls`, whose
+    steps need it, determines the norm.
+    """
+    zeros = [state for state in cls(scaling="absolute").iterate(circles()) if state.iteration == 0]
+    assert (len(zeros) > 1) == (cls is Nnls)
 
 
 @pytest.mark.parametrize("cls", OURS, ids=named)
@@ -205,12 +207,13 @@ def test_lsqr_is_the_direct_solution(make, regularizer, tau):
 
 
 def test_lsqr_iterates_are_those_of_scipy():
-    """Step by step the images are those of scipy's LSQR on the same stack."""
+    """Step by step, and not preconditioned, the images are those of scipy's LSQR on the same stack."""
     problem = circles()
     w = 1e-2 * problem.norm**2
     rough = Laplacian().operator(problem.shape).matmat(np.eye(400))
     stack, padded = np.vstack([dense(problem), np.sqrt(w) * rough]), np.concatenate([problem.data, np.zeros(400)])
-    states = [s for s in Lsqr(weight=1e-2, n_iterations=12).iterate(problem) if s.iteration]
+    solver = Lsqr(weight=1e-2, n_iterations=12, preconditioner="none")
+    states = [s for s in solver.iterate(problem) if s.iteration]
     for state in states:
         expected = scipy.sparse.linalg.lsqr(stack, padded, atol=0, btol=0, iter_lim=state.iteration)[0]
         np.testing.assert_allclose(state.image.ravel(), expected, atol=1e-12 * abs(expected).max())

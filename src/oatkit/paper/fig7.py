@@ -19,7 +19,7 @@ STEPS = 20
 """Of the least squares that are stopped early, as is usual: what is large is not filled by then."""
 STOPPED = f"L2, {STEPS} steps"
 METHODS = {
-    STOPPED: ("lsqr", f"reconstruct.n_iterations={STEPS}"),
+    STOPPED: ("lsqr", f"reconstruct.n_iterations={STEPS}", "reconstruct.preconditioner=none"),
     "L2": ("lsqr",),
     "L2, thresholded": ("lsqr-threshold",),
     "MaxEnt": ("maxent",),

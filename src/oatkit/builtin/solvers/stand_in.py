@@ -4,17 +4,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy import fft
 
 from oatkit.api import Problem
+from oatkit.builtin.solvers.convolution import convolved, gains_of
 from oatkit.vectors import inner, norm
-
-FLOOR = 1e-2
-"""Least gain of the convolution, relative to its largest: what one pixel does not show, another may."""
-
-BLUR_BINS = 1.5
-"""Standard deviation of the Gaussian that smooths the gains: a pixel elsewhere has none of the fine ripple that the
-edges of the image cause."""
 
 POWER_STEPS = 12
 """Steps of the power iteration for each estimate of the norm of B, from where the last ended and what was learnt."""
@@ -26,9 +19,8 @@ SAFETY = 1.3
 class StandIn:
     """B near A^T A.
 
-    Inside a detector array A^T A is nearly shift-invariant, and then the answer to one pixel in the middle gives all of
-    it: B starts as the circular convolution with that answer. Each product s -> y of A^T A mends it by the BFGS formula
-    [Nocedal2006]_, so that y = B s: B + y y^T / (y^T s) - B s s^T B / (s^T B s).
+    B starts as a circular convolution (`oatkit.builtin.solvers.convolution`). Each product s -> y of A^T A mends it by
+    the BFGS formula [Nocedal2006]_, so that y = B s: B + y y^T / (y^T s) - B s s^T B / (s^T B s).
 
     References:
         [Nocedal2006] Nocedal and Wright, Numerical Optimization, Springer (2006), Eq. 6.19, 10.1007/978-0-387-40065-5.
@@ -43,21 +35,13 @@ class StandIn:
     @classmethod
     def of(cls, problem: Problem) -> Self | None:
         """Make one by a single product; None where the pixel in the middle is not seen."""
-        from scipy.ndimage import gaussian_filter
-
-        middle = problem.shape[0] // 2, problem.shape[1] // 2
-        pixel = np.zeros(problem.shape)
-        pixel[middle] = 1.0
-        answer = problem.adjoint(problem.forward(pixel))
-        centred = np.roll(answer, (-middle[0], -middle[1]), axis=(0, 1))
-        gains = gaussian_filter(fft.fft2(centred).real, BLUR_BINS, mode="wrap")[:, : problem.shape[1] // 2 + 1]
-        largest = gains.max()
-        return cls(problem.shape, np.maximum(gains, FLOOR * largest)) if largest > 0 else None
+        gains = gains_of(problem)
+        return None if gains is None else cls(problem.shape, gains)
 
     def apply(self, image: np.ndarray) -> np.ndarray:
         """Return B x."""
         mended = (self._signs * (self._rows @ image.ravel())) @ self._rows
-        return fft.irfft2(fft.rfft2(image) * self.gains, s=self.shape) + mended.reshape(self.shape)
+        return convolved(image, self.gains) + mended.reshape(self.shape)
 
     def learn(self, step: np.ndarray, change: np.ndarray) -> float:
         """Mend B so that it maps `step` s to `change` A^T A s.
