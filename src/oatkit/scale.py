@@ -50,27 +50,31 @@ def spectral_norm(
     was 2e-3 too low. 0 for a zero operator.
     """
     v = np.random.default_rng(0).standard_normal(shape[1])
-    right = [v / norm(v)]
+    most = min(steps, *shape)
+    basis = np.empty((most, shape[1]))  # memory is taken as rows are written
+    basis[0] = v / norm(v)
     alphas: list[float] = []
     betas: list[float] = []
     value, u = 0.0, np.zeros(shape[0])
-    for _ in range(min(steps, *shape)):
-        u = forward(right[-1]) - (betas[-1] if betas else 0.0) * u
+    for step in range(most):
+        u *= -betas[-1] if betas else 0.0
+        u += forward(basis[step])
         alphas.append(norm(u))
         left, values, _ = np.linalg.svd(np.diag(alphas) + np.diag(betas, 1))
         value = float(values[0])
         if alphas[-1] <= 1e-14 * value:
             break
-        u = u / alphas[-1]
+        u /= alphas[-1]
         v = adjoint(u).ravel()
         yield
-        basis = np.array(right)
-        v = v - np.einsum("i,ij->j", np.einsum("ij,j->i", basis, v), basis)  # rounding would let old directions back in
+        right = basis[: step + 1]
+        v = v - np.einsum("i,ij->j", np.einsum("ij,j->i", right, v), right)  # rounding would let old directions back in
         betas.append(norm(v))
         fits = betas[-1] * abs(left[-1, 0]) <= tolerance * value
         if betas[-1] <= 1e-14 * value or (fits and len(alphas) >= STEPS_BEFORE_TRUST):
             break
-        right.append(v / betas[-1])
+        if step + 1 < most:
+            basis[step + 1] = v / betas[-1]
     return value, len(alphas)
 
 
