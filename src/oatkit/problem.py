@@ -1,7 +1,7 @@
 """What a solver gets and what it yields."""
 
 from collections.abc import Generator, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -37,8 +37,8 @@ class Problem:
     """Which detectors count, bool, shape ``(detector,)``; None where all do. In the rows of the others operator and
     data are zero: an inversion need not look at it, a sum over detectors must."""
     start: np.ndarray | None = None
-    """An image of nearby data, where there is one: in a scan that of the wavelength before, in the same frame. A solver
-    may begin near it to have fewer steps to go; what it solves does not depend on it."""
+    """An image of nearby data or of another weight, where there is one: in a scan that of the wavelength before, in the
+    same frame. A solver may begin near it to have fewer steps to go; what it solves does not depend on it."""
 
     def __post_init__(self) -> None:
         checked = {
@@ -60,6 +60,17 @@ class Problem:
             raise ValidationError(f"problem: a geometry of shape {self.geometry.shape} does not fit {rows} data")
         if self.grid and self.grid.shape != self.shape:
             raise ValidationError(f"problem: a grid of shape {self.grid.shape} does not fit an image of {self.shape}")
+
+    def near(self, image: np.ndarray) -> "Problem":
+        """Return the same problem with a start, with what is known of its scale; as it is where the image is not finite
+        or of another shape.
+        """
+        if np.shape(image) != self.shape or not np.isfinite(image).all():
+            return self
+        made = replace(self, start=image)
+        known = ("back_projected", "_norm", "_reference")
+        made.__dict__.update({name: self.__dict__[name] for name in known if name in self.__dict__})
+        return made
 
     def forward(self, image: np.ndarray) -> np.ndarray:
         """Return A x as float64, raveled. Raises `SolverError` where it is not finite."""

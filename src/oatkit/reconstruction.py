@@ -63,7 +63,7 @@ def reconstruct(pipeline: Pipeline, clean: Scan, grid: Grid, memo: Memo) -> Iter
     last: list[Iterate] = []
     norms: list[float] = []
     for wavelength, alone in problems(pipeline, clean, grid, memo):
-        problem = replace(alone, start=last[-1].image) if last else alone
+        problem = alone.near(last[-1].image) if last else alone
         state = None
         with blame(solver):
             for state in solver.iterate(problem):

@@ -115,9 +115,10 @@ def choose(
     """Solve the problem at each candidate weight and pick one by `rule`.
 
     ``"l-curve"`` takes the corner of the L-curve, ``"hold-out"`` the weight whose image predicts the signals of every
-    seventh detector best when it is made from the others. `on_event` is told before each candidate how many are done,
-    `on_point` is shown each point; every candidate is solved from the solver's own start, so that its image is the one
-    that the solver gives at that weight. What the solver raises beside our errors becomes a `PluginError`. Raises
+    seventh detector best when it is made from the others. The candidates are one path, from the strongest to the
+    weakest: a solver may begin near the image of the one before (`Problem.start`), and then its image at a weight is
+    the one that it gives alone to within its tolerance. `on_event` is told before each candidate how many are done,
+    `on_point` is shown each point. What the solver raises beside our errors becomes a `PluginError`. Raises
     `ValidationError` for an unknown rule, for fewer than five or non-positive candidates, for a solver without a
     weight, for a weight in absolute units without candidates of its own, for data that are zero, and for a hold-out
     without fourteen detectors.
@@ -128,7 +129,7 @@ def choose(
     if not problem.data.any():
         raise ValidationError("weight: the data are zero, so that no rule can choose; take a number")
     fit, rows = (problem, None) if rule == "l-curve" else _keep_back(problem)
-    curve = tuple(sweep(solver, fit, weights, problem, rows, on_event, on_point))
+    curve = tuple(sweep(solver, fit, weights[::-1], problem, rows, on_event, on_point))[::-1]
     picks = _picks(curve)
     weight = picks["curvature" if rule == "l-curve" else "prediction"]
     return Choice(rule, weight, curve, tuple(picks.items()), tuple(_notes(weight, curve, picks)))
@@ -161,15 +162,20 @@ def sweep(
     on_event: Listener = ignore,
     on_point: PointListener = ignore_point,
 ) -> Iterator[CurvePoint]:
-    """Yield what each weight gives on the problem `fit`, and how well it predicts the rows `held_out` of `whole`."""
+    """Yield what each weight gives on the problem `fit`, and how well it predicts the rows `held_out` of `whole`.
+
+    Each begins near the image of the weight before.
+    """
+    here = fit
     for done, weight in enumerate(weights):
         on_event(StepStarted(f"{CHOOSING}, {done} of {len(weights)} done"))
         with blame(solver):
-            last = with_weight(solver, weight).solve(fit)
+            last = with_weight(solver, weight).solve(here)
             point = _point(solver, weight, last)
             if held_out is not None:
                 misfit = (whole.forward(last.image) - whole.data)[held_out]
                 point = replace(point, prediction_error=norm(misfit))
+        here = fit.near(last.image)
         on_point(point, last)
         yield point
 

@@ -5,12 +5,13 @@ Three things make it quick from a cold start at weak weights, where plain Newton
 - It steps in the coordinate v = x + t log(x / m), t = w / (2 |A|^2), of which x is the proximal map. There v is x where
   a pixel is bright and the data rule, and t log x where it is dark and the entropy rules, so that a pixel can be put
   out or lit in one step.
-- After each Newton step come two accelerated proximal gradient steps, which light the pixels that were put out wrongly.
-- The weight falls from a strong one to the one that is asked for.
+- After each Newton step come accelerated proximal gradient steps, which light the pixels that were put out wrongly.
+- The weight falls from a strong one to the one that is asked for; at weak weights Newton steps are left early, and more
+  of the others follow, since conjugate gradients slow down there more than they do.
 """
 
 from collections.abc import Generator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,26 +21,38 @@ from oatkit.builtin.solvers.maxent_objective import EntropyObjective, EntropyPoi
 FIRST_TAU = 2e-3
 """Where the dimensionless weight starts if it is asked to be weaker."""
 
-DECAY = 0.3
+DECAY = 0.5
 """How much it falls with each Newton step."""
 
 FIRST_STEPS = 10
 """Accelerated steps before the first Newton step."""
 
-STEPS_BETWEEN = 2
-"""Accelerated steps after each Newton step; ten where it found no descent."""
 
-INNER_STEPS = 60
-"""Largest number of conjugate gradient steps in a Newton step."""
+@dataclass(frozen=True)
+class Pace:
+    """How far the parts of a step go."""
+
+    inner: int
+    """Largest number of conjugate gradient steps in a Newton step."""
+    between: int
+    """Accelerated steps after each Newton step; ten at least where it found no descent."""
+
+
+STRONG, WEAK = Pace(inner=60, between=2), Pace(inner=20, between=6)
 
 Steps = Generator[EntropyPoint, None, EntropyPoint]
 """Yields the newest point after every application of A^T A, and returns the last one."""
 
 
-def newton(objective: EntropyObjective, start: np.ndarray) -> Steps:
-    """Yield points from z = `start` towards the optimum, without end."""
+def newton(objective: EntropyObjective, start: np.ndarray, near: bool = False) -> Steps:
+    """Yield points from z = `start` towards the optimum, without end.
+
+    A start that is `near` is the optimum of a neighbour, from where the weight need not fall.
+    """
     problem, target = objective.problem, objective.weight
-    weight = max(target, FIRST_TAU * problem.norm**2 * problem.reference.level)
+    strong = max(target, FIRST_TAU * problem.norm**2 * problem.reference.level)
+    pace = WEAK if strong > target else STRONG
+    weight = target if near else strong
     point = objective.at(start)
     yield point
     point = yield from _accelerated(_reweighted(point, weight), FIRST_STEPS)
@@ -47,20 +60,20 @@ def newton(objective: EntropyObjective, start: np.ndarray) -> Steps:
     first = _size(point)
     while True:
         forcing = min(0.5, np.sqrt(_size(point) / first)) if first else 0.5
-        point = yield from _newton_step(point, forcing, curvature)
+        point = yield from _newton_step(point, forcing, curvature, pace)
         if weight > target:
             weight = max(target, DECAY * weight)
             point = _reweighted(point, weight)
             first = _size(point)
 
 
-def _newton_step(point: EntropyPoint, forcing: float, curvature: float) -> Steps:
+def _newton_step(point: EntropyPoint, forcing: float, curvature: float, pace: Pace) -> Steps:
     """Take a Newton step as far as P falls, then accelerated ones."""
-    change = yield from _direction(point, forcing, curvature)
+    change = yield from _direction(point, forcing, curvature, pace.inner)
     new = yield from _line_search(point, change)
     if new is None:
-        return (yield from _accelerated(point, 5 * STEPS_BETWEEN))
-    return (yield from _accelerated(new, STEPS_BETWEEN))
+        return (yield from _accelerated(point, max(10, pace.between)))
+    return (yield from _accelerated(new, pace.between))
 
 
 def _accelerated(point: EntropyPoint, steps: int) -> Steps:
@@ -78,7 +91,9 @@ def _accelerated(point: EntropyPoint, steps: int) -> Steps:
     return point
 
 
-def _direction(point: EntropyPoint, forcing: float, curvature: float) -> Generator[EntropyPoint, None, np.ndarray]:
+def _direction(
+    point: EntropyPoint, forcing: float, curvature: float, most_steps: int
+) -> Generator[EntropyPoint, None, np.ndarray]:
     """Return the change of z that solves (w + 2 A^T A X) dz = -gradient, to a relative accuracy `forcing`.
 
     By conjugate gradients in the inner product <u, X v>, X = diag(x), in which that matrix is symmetric: nothing is
@@ -90,7 +105,7 @@ def _direction(point: EntropyPoint, forcing: float, curvature: float) -> Generat
     metric = image / (weight + 2 * curvature * image)
     energy = first = float((metric * residual**2).sum())
     direction = residual / (weight + 2 * curvature * image)
-    for _ in range(INNER_STEPS):
+    for _ in range(most_steps):
         if energy <= forcing**2 * first:
             break
         curved = weight * direction + 2 * objective.hessian(image * direction)

@@ -88,7 +88,7 @@ class MaxEntNlcg(Solver):
     def _points(self, objective: EntropyObjective) -> Iterator[EntropyPoint]:
         if self.method == "paper":
             return conjugate_gradients(objective, np.zeros_like(objective.prior))
-        return newton(objective, _start(objective))
+        return newton(objective, _start(objective), near=_brightness_of_start(objective.problem) > 0)
 
     def _reason(self, state: Iterate) -> str:
         gap = state.relative_gap
@@ -116,10 +116,15 @@ def _start(objective: EntropyObjective) -> np.ndarray:
     level, prior = problem.reference.level, np.log(objective.prior)
     if level == 0:
         return np.zeros_like(objective.prior)
-    brightest = 0.0 if problem.start is None else float(np.percentile(problem.start, 99))
+    brightest = _brightness_of_start(problem)
     if problem.start is None or not brightest > 0:
         return np.log(np.maximum(problem.reference.base, FLOOR * level)) - prior
     return np.log(np.maximum(problem.start * (level / brightest), DARKEST * level)) - prior
+
+
+def _brightness_of_start(problem: Problem) -> float:
+    """Return the 99th percentile of the problem's own start; 0 where it has none."""
+    return 0.0 if problem.start is None else float(np.percentile(problem.start, 99))
 
 
 def _scale(objective: EntropyObjective) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """A sweep over the weight with all that it shows: the curve, the picks of the rules, the image of each point. No Qt."""
 
+from bisect import insort
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
@@ -100,7 +101,7 @@ class WeightSweep:
         elif isinstance(item, Begun):
             self.begun = item
         elif isinstance(item, Tried):
-            self.tried.append(item)
+            insort(self.tried, item, key=lambda tried: tried.point.weight)
         elif isinstance(item, CurvePoint):
             self.held_out.append(item)
         elif isinstance(item, Choice):
@@ -154,10 +155,9 @@ class WeightSweep:
 def begin(session: Session, request: Request) -> tuple[WeightSweep, Job]:
     """Start a sweep and return it with the job that yields what its `take` takes.
 
-    Each weight is solved from the solver's own start, so that its image is the one of a run, bit by bit; but where
-    `maxent-nlcg` begins near the wavelength before, the two agree within their certificates.
-    Raises `ValidationError` where there is no scan, the solver has no weight or one that is not dimensionless, and the
-    weights are too few or no range.
+    The image of a weight is the one of a run, bit by bit; but where `maxent-nlcg` begins near the weight or the
+    wavelength before, the two agree within their certificates. Raises `ValidationError` where there is no scan, the
+    solver has no weight or one that is not dimensionless, and the weights are too few or no range.
     """
     scan, frame, pipeline = session.scan, session.frame, session.pipeline
     if scan is None:
