@@ -11,7 +11,20 @@ import oatkit
 
 SOURCE = Path(oatkit.__file__).parent
 
-HEAVY = ("numba", "zarr", "matplotlib", "napari", "dask", "scipy.sparse.linalg", "h5py", "skimage", "tifffile", "typer")
+HEAVY = (
+    "numba",
+    "zarr",
+    "matplotlib",
+    "napari",
+    "dask",
+    "scipy.fft",
+    "scipy.special",
+    "scipy.sparse",
+    "h5py",
+    "skimage",
+    "tifffile",
+    "typer",
+)
 
 ORDER = [
     {"checkpoint", "compiled", "errors", "laplacian", "names", "vectors"},
@@ -81,9 +94,9 @@ def test_imports_run_one_way(path):
     assert not wrong, f"{module} imports {wrong}, which are not below it"
 
 
-def loaded_after(code: str) -> set[str]:
-    """Which heavy modules a fresh interpreter holds after running `code`."""
-    script = f"{code}\nimport sys\nprint(*[m for m in {HEAVY!r} if m in sys.modules])"
+def loaded_after(code: str, looked_for: tuple[str, ...] = HEAVY) -> set[str]:
+    """Which of some modules a fresh interpreter holds after running `code`."""
+    script = f"{code}\nimport sys\nprint(*[m for m in {looked_for!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     return set(done.stdout.split())
 
@@ -91,6 +104,20 @@ def loaded_after(code: str) -> set[str]:
 def test_importing_oatkit_loads_nothing_heavy():
     """`import oatkit` pays for no library that is not needed yet."""
     assert loaded_after("import oatkit") == set()
+
+
+def test_the_command_line_starts_with_next_to_nothing():
+    """Help and the version wait for neither numpy nor pydantic, nor for any module that computes."""
+    assert loaded_after("import oatkit.cli", ("numpy", "pydantic", "oatkit.data", "oatkit.registry")) == set()
+
+
+def test_every_public_name_is_there_though_it_is_imported_late():
+    """What the stub says is what the package has, and modules are reached as attributes; other names are an error."""
+    code = "import oatkit; print(*[n for n in [*oatkit.__all__, 'weights', 'spectra'] if not getattr(oatkit, n)])"
+    assert loaded_after(code) <= set(HEAVY)
+    assert set(oatkit.__all__) <= set(dir(oatkit))
+    with pytest.raises(AttributeError, match="module 'oatkit' has no attribute 'reed'"):
+        oatkit.reed  # noqa: B018
 
 
 def test_declaring_plugins_loads_nothing_heavy():

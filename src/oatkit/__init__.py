@@ -7,22 +7,24 @@
 True
 """
 
-from oatkit.batch import run_frames
-from oatkit.data import Detectors, Geometry, Grid, Image, Optics, Scan
-from oatkit.engine import run
-from oatkit.engine.stepping import steps
-from oatkit.errors import OatkitError, PluginError, ReadError, ResultError, SolverError, ValidationError
-from oatkit.memo import Memo
-from oatkit.pipeline import Pipeline
-from oatkit.reading import read, read_images, read_regions
-from oatkit.registry import plugin
-from oatkit.result import Result
-from oatkit.store import load, verify
+from importlib import import_module
+from typing import Any
+
+import lazy_loader
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "Detectors", "Geometry", "Grid", "Image", "Memo", "OatkitError", "Optics", "Pipeline", "PluginError", "ReadError",
-    "Result", "ResultError", "Scan", "SolverError", "ValidationError", "load", "plugin", "read", "read_images",
-    "read_regions", "run", "run_frames", "steps", "verify",
-]  # fmt: skip
+# Each name is imported when it is first asked for; where it comes from stands in __init__.pyi.
+_public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> Any:
+    """Return a public name, or a module of this package."""
+    if name in __all__:
+        return _public(name)
+    try:
+        return import_module(f"{__name__}.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != f"{__name__}.{name}":
+            raise
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'") from None

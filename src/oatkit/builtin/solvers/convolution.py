@@ -5,7 +5,6 @@ the middle gives all of it.
 from collections.abc import Callable
 
 import numpy as np
-from scipy import fft
 
 from oatkit.api import Problem, Quadratic
 
@@ -19,6 +18,8 @@ edges of the image cause."""
 
 def convolved(image: np.ndarray, gains: np.ndarray) -> np.ndarray:
     """Return the circular convolution of an image with these gains, over half of its frequencies as of `rfft2`."""
+    from scipy import fft
+
     return fft.irfft2(fft.rfft2(image) * gains, s=image.shape)
 
 
@@ -41,7 +42,9 @@ def penalty_gains(regularizer: Quadratic, shape: tuple[int, int]) -> np.ndarray:
 
 def _answered(normal: Callable[[np.ndarray], np.ndarray], shape: tuple[int, int]) -> np.ndarray:
     """Return the gains at all frequencies of the convolution that answers the pixel in the middle as `normal` does."""
+    from scipy.fft import fft2
+
     middle = shape[0] // 2, shape[1] // 2
     pixel = np.zeros(shape)
     pixel[middle] = 1.0
-    return fft.fft2(np.roll(normal(pixel), (-middle[0], -middle[1]), axis=(0, 1))).real
+    return fft2(np.roll(normal(pixel), (-middle[0], -middle[1]), axis=(0, 1))).real
