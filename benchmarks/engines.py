@@ -19,7 +19,9 @@ from faults import same, write
 from oatkit.batch import engine_named, run_frames
 from operators import cpu_model
 
-CHANGES = ("grid.pixels=100", "grid.field_of_view_mm=9", "reconstruct.n_iterations=20")
+CHANGES = (
+    "grid.pixels=100", "grid.field_of_view_mm=9", "reconstruct.n_iterations=20", "reconstruct.preconditioner=none",
+)  # fmt: skip
 WORKERS = 2
 
 

@@ -2,7 +2,8 @@
 
     python benchmarks/startup.py
 
-Prints medians of seven starts of `oatkit plugins`, and their ratio. The broken packages are those of the tests.
+Prints medians of seven starts of `oatkit --help`, and of `oatkit plugins`, which imports all plugins, with their ratio.
+The broken packages are those of the tests.
 """
 
 import os
@@ -22,10 +23,10 @@ from test_registry import BROKEN, GOOD
 STARTS = 7
 
 
-def median_s(path: Path | None) -> float:
-    """Return the median time of a start, s, with the packages of a folder beside those that are installed."""
+def median_s(argument: str, path: Path | None = None) -> float:
+    """Return the median time of a command, s, with the packages of a folder beside those that are installed."""
     environment = {**os.environ, **({"PYTHONPATH": str(path)} if path else {})}
-    command = [sys.executable, "-c", "from oatkit.cli import main; main()", "plugins"]
+    command = [sys.executable, "-c", "from oatkit.cli import main; main()", argument]
     times = []
     for _ in range(STARTS):
         start = time.perf_counter()
@@ -41,10 +42,9 @@ def main() -> None:
         install(packages, "oatkit-good", GOOD.format(name="landweber"))
         for name, (module, _) in BROKEN.items():
             install(packages, f"oatkit-{name}", module)
-        alone, beside = median_s(None), median_s(packages)
-    print(
-        f"{cpu_model()}: {alone:.2f} s alone, {beside:.2f} s beside {len(BROKEN)} broken plugins: {beside / alone:.2f}"
-    )
+        alone, beside = median_s("plugins"), median_s("plugins", packages)
+    print(f"{cpu_model()}: {median_s('--help'):.2f} s for help; all plugins: {alone:.2f} s")
+    print(f"beside {len(BROKEN)} broken plugins: {beside:.2f} s, {beside / alone:.2f} times that")
 
 
 if __name__ == "__main__":
