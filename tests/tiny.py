@@ -22,13 +22,18 @@ def shrunk(of_table: Callable[..., Any], most: int = PIXELS) -> Callable[..., An
     return small
 
 
+def new(words: list[str]) -> list[str]:
+    """Return the words of a command so that it writes over what is there: pages show several ways to write one file."""
+    writes = "-o" in words and not {"--resume", "--overwrite", "new-plugin"} & set(words)
+    return [*words, "--overwrite"] if writes else words
+
+
 def main() -> None:
-    """Run the command line; pages show several ways to write one file, of which each is tried."""
+    """Run the command line."""
     from oatkit.cli import main
 
     Pipeline.of_table = shrunk(Pipeline.of_table)  # type: ignore[method-assign]
-    if "-o" in sys.argv and not {"--resume", "--overwrite", "new-plugin"} & set(sys.argv):
-        sys.argv.append("--overwrite")
+    sys.argv = new(sys.argv)
     main()
 
 
