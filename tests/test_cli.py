@@ -96,7 +96,14 @@ def test_describe_shows_type_unit_range_and_default():
     text = run_oatkit("describe", "band-pass").stdout
     assert "high = 7.0" in text
     assert "MHz" in text
-    assert "Prakash" in run_oatkit("describe", "maxent-nlcg").stdout
+    assert "[Prakash2019]." in run_oatkit("describe", "maxent-nlcg").stdout
+
+
+def test_describe_shows_the_tables_of_a_pipeline_that_are_no_plugins():
+    """`describe grid` prints the keys of that table; a name that is neither is an error with the nearest one."""
+    text = run_oatkit("describe", "grid").stdout
+    assert "pixels = 200" in text
+    assert "did you mean 'grid'?" in run_oatkit("describe", "gird").stderr
 
 
 @pytest.mark.parametrize("suffix", [".png", ".ome.tif", ".h5"])

@@ -15,7 +15,7 @@ from doc_pages import ROOT, blocks, commands, imports, inline, pages, text_of
 from oatkit import api, hookspecs
 from oatkit.api import KINDS
 from oatkit.cli.app import EXIT_CODES
-from oatkit.describe import parameter_rows
+from oatkit.describe import parameter_rows, pipeline_tables
 from oatkit.parameters import part_of
 from oatkit.pipeline import Pipeline, presets
 from oatkit.registry import installed
@@ -71,7 +71,7 @@ def test_the_reference_has_the_pipeline_file():
     """Every key of a pipeline file, and every parameter of its tables that are no plugins, has a row."""
     page = REFERENCE["pipeline.rst"]
     rows = re.findall(r"^   \* - ``(\w+)``$", page, re.MULTILINE)
-    tables = [row.name for _, cls in catalogue.tables() for row in parameter_rows(cls)]
+    tables = [row.name for _, cls in pipeline_tables().items() for row in parameter_rows(cls)]
     assert rows == [*Pipeline.model_fields, *tables]
     assert len(tables) > 10
 

@@ -1,9 +1,7 @@
 """Pages on the plugins by kind, the tables of a pipeline file and the presets, from their declarations."""
 
-from collections.abc import Iterable
-
 from oatkit.api import KINDS, Plugin, Proximable, Quadratic, Smooth
-from oatkit.describe import parameter_rows
+from oatkit.describe import parameter_rows, pipeline_tables
 from oatkit.parameters import Parameters, part_of
 from oatkit.pipeline import Pipeline, presets
 from oatkit.registry import Entry, installed
@@ -72,17 +70,9 @@ def _parameters(cls: type[Parameters]) -> str:
 def _pipeline() -> str:
     """Return the page on the pipeline file: its keys, and those of each table that is no plugin."""
     parts = [heading("Pipeline file"), rst_of(Pipeline.__doc__ or ""), "", _steps()]
-    for name, cls in tables():
+    for name, cls in pipeline_tables().items():
         parts += [f".. _table-{name}:", "", heading(f"[{name}]", "-"), rst_of(cls.__doc__ or ""), "", _parameters(cls)]
     return "\n".join(parts)
-
-
-def tables() -> Iterable[tuple[str, type[Parameters]]]:
-    """Yield the tables of a pipeline file that are no plugins."""
-    for name, field in Pipeline.model_fields.items():
-        cls = part_of(field)
-        if cls and not cls.kind:
-            yield name, cls
 
 
 def _steps() -> str:

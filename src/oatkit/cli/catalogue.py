@@ -92,21 +92,28 @@ def _line(row: dict[str, Any]) -> str:
 
 @command
 def describe(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A plugin's name, as `oatkit plugins` lists it.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME", help="A plugin's name, as `oatkit plugins` lists it, or a table of a pipeline: grid."
+        ),
+    ],
 ) -> None:
     """Print what a plugin does, its references and parameters.
 
     Each parameter with its type, unit, range and default.
     """
-    from oatkit.api import KINDS
-    from oatkit.describe import plugin_text
+    from oatkit.describe import pipeline_tables, plugin_text, table_text
     from oatkit.names import did_you_mean
     from oatkit.registry import installed
 
     entries = [e for e in installed().entries if name in (e.name, e.full_name)]
-    if not entries:
-        known = [e.name for e in installed().entries]
-        raise ValidationError(f"no plugin named '{name}' of any kind ({', '.join(KINDS)}){did_you_mean(name, known)}")
+    tables = pipeline_tables()
+    if not entries and name not in tables:
+        known = [*(e.name for e in installed().entries), *tables]
+        raise ValidationError(f"no plugin and no table of a pipeline is named '{name}'{did_you_mean(name, known)}")
+    if name in tables:
+        typer.echo(table_text(name, tables[name]))
     for entry in entries:
         origin = f"{entry.distribution} {entry.version}"
         typer.echo(plugin_text(entry.cls, origin) if entry.cls else f"{entry.full_name}: {entry.problem}")

@@ -1,6 +1,5 @@
-"""Plugins and scans described in words, from their own declarations."""
+"""Scans, and what lies beside them."""
 
-import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,28 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from oatkit.api import Plugin, Region
+from oatkit.api import Region
 from oatkit.data import Image, Scan
 from oatkit.errors import OatkitError
-from oatkit.focus import Focus
-from oatkit.motion import Motion
-from oatkit.parameters import Parameters, bounds_of, expected
 from oatkit.reading import read_images, read_regions
 from oatkit.slips import scan_notes
 from oatkit.wavelengths import wavelength_notes
 
-
-@dataclass(frozen=True)
-class ParameterRow:
-    """One parameter of a plugin."""
-
-    name: str
-    takes: str
-    """Type, range and unit in words."""
-    unit: str
-    default: str
-    """As a pipeline file writes it."""
-    meaning: str
+MOST_LINES = 20
+"""How many images, and how many regions, are listed one by one for a reader's eyes."""
 
 
 @dataclass(frozen=True)
@@ -57,28 +43,6 @@ def look_beside(path: Path) -> Beside:
     except OatkitError as error:
         notes.append(f"Regions: {error}")
     return Beside(images, regions, tuple(notes))
-
-
-MOST_LINES = 20
-"""How many images, and how many regions, are listed one by one for a reader's eyes."""
-
-
-def parameter_rows(cls: type[Parameters]) -> list[ParameterRow]:
-    """Return the parameters of a plugin class in the order of their declaration."""
-    return [
-        ParameterRow(name, expected(f), bounds_of(f).unit, _default(f.default), f.description or "")
-        for name, f in cls.model_fields.items()
-    ]
-
-
-def plugin_text(cls: type[Plugin], origin: str) -> str:
-    """Return kind, name, docstring and a paragraph for each parameter of a plugin."""
-    lines = [f"{cls.kind.replace('_', ' ')} {cls.name}   ({origin})", "", inspect.cleandoc(cls.__doc__ or ""), ""]
-    rows = parameter_rows(cls)
-    lines.append("Parameters:" if rows else "It has no parameters.")
-    for row in rows:
-        lines += [f"  {row.name} = {row.default}", f"      {row.meaning}", f"      takes {row.takes}"]
-    return "\n".join(lines)
 
 
 def scan_table(scan: Scan, beside: Beside | None = None) -> dict[str, Any]:
@@ -144,33 +108,3 @@ def _few(what: str, values: list[str]) -> list[tuple[str, str]]:
     """Return a row for each value, and one for all those beyond `MOST_LINES`."""
     rows = [(what, value) for value in values[:MOST_LINES]]
     return [*rows, (what, f"... and {len(values) - MOST_LINES} more")] if len(values) > MOST_LINES else rows
-
-
-def focus_text(focus: Focus) -> str:
-    """Return a speed of sound by focus as lines: the pick, what the scan says, what the other metrics pick."""
-    rows = [
-        ("speed of sound", f"{focus.speed_m_s:.1f} m/s by focus ({focus.metric})"),
-        ("the scan says", f"{focus.header_m_s:.1f} m/s ({focus.header_source})"),
-        ("tried", f"{len(focus.speeds_m_s)} speeds, {focus.speeds_m_s[0]:.0f} .. {focus.speeds_m_s[-1]:.0f} m/s"),
-        *((name, f"{pick:.1f} m/s") for name, pick in focus.picks.items() if name != focus.metric),
-    ]
-    lines = [f"{name:<20}{value}" for name, value in rows]
-    return "\n".join([*lines, *(f"note: {note}" for note in focus.notes)])
-
-
-def motion_text(motion: Motion) -> str:
-    """Return what moved as lines: how many pulses, each of them, and what else to know."""
-    moved = motion.moved
-    head = f"{int(moved.sum())} of {moved.size} pulses out of place, in {len(motion.frames)} of {len(moved)} frames"
-    lines = [sentence for frame in motion.frames for sentence in motion.of_frame(frame)]
-    return "\n".join([head, *lines, *(f"note: {note}" for note in motion.notes)])
-
-
-def _default(value: Any) -> str:
-    if isinstance(value, Parameters):
-        return f'"{value.name}"' if value.name else "{}"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, tuple):
-        return f"[{', '.join(_default(v) for v in value)}]"
-    return f'"{value}"' if isinstance(value, str) else "not set" if value is None else str(value)
