@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from oatkit.api import Iterate, Problem, param
-from oatkit.builtin.solvers.bidiagonalisation import least_squares
+from oatkit.builtin.solvers.least_squares import least_squares
 from oatkit.builtin.solvers.preconditioner import Preconditioner
 from oatkit.builtin.solvers.quadratic import QuadraticSolver
 
