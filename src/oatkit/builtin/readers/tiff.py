@@ -51,7 +51,7 @@ def _all_pages(path: Path) -> list[Page]:
             return [p for index in range(n_pages) for p in _planes(path, file.pages[index], file.byteorder)]
     except ReadError:
         raise
-    except (OSError, *DAMAGE) as error:
+    except (OSError, tifffile.TiffFileError, *DAMAGE) as error:
         raise ReadError(f"{path}: not a TIFF file, or damaged ({printable(str(error), 200)})") from None
 
 

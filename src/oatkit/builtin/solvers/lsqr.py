@@ -1,18 +1,13 @@
 """Regularized least squares, signed."""
 
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import ClassVar, Literal
+from typing import ClassVar
 
-import numpy as np
-
-from oatkit.api import Iterate, Problem, param
-from oatkit.builtin.solvers.least_squares import least_squares
-from oatkit.builtin.solvers.preconditioner import Preconditioner
-from oatkit.builtin.solvers.quadratic import QuadraticSolver
+from oatkit.api import Iterate, Problem
+from oatkit.builtin.solvers.signed import SignedSolver
 
 
-class Lsqr(QuadraticSolver):
+class Lsqr(SignedSolver):
     """Least squares with a quadratic penalty, min |A x - b|^2 + w |L x|^2, by LSQR.
 
     The image is signed: its negative pixels mean nothing physically. Eq. 4 and 17 of [Prakash2019]_. Where A^T A is
@@ -26,14 +21,7 @@ class Lsqr(QuadraticSolver):
     """
 
     name: ClassVar[str] = "lsqr"
-    steps_by_norm: ClassVar[bool] = False
-    preconditioner: Literal["convolution", "none"] = param("convolution", "what shortens the way to the solution")
 
     def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:
-        """Yield the iterates of LSQR, after a zero image where a preconditioner was made."""
-        by, spent = None, 0
-        if self.preconditioner == "convolution":
-            by, spent = Preconditioner.of(problem, self.regularizer, weight), 1
-            yield Iterate(np.zeros(problem.shape), 0, products=spent)
-        for state in least_squares(problem, self.regularizer, weight, self.n_iterations, self.tolerance, by):
-            yield replace(state, products=spent + state.products)
+        """Yield the iterates of LSQR."""
+        return self.signed(problem, weight)

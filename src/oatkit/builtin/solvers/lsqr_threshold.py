@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from oatkit.api import Iterate, Problem
-from oatkit.builtin.solvers.lsqr import Lsqr
+from oatkit.builtin.solvers.signed import SignedSolver
 from oatkit.vectors import norm
 
 
-class LsqrThreshold(Lsqr):
+class LsqrThreshold(SignedSolver):
     """Least squares with a quadratic penalty, then negative pixels set to zero.
 
     This is how [Prakash2019]_ solves its Eq. 18; it is not the minimiser under x >= 0, which `nnls` finds. Objective,
@@ -26,7 +26,7 @@ class LsqrThreshold(Lsqr):
 
     def descend(self, problem: Problem, weight: float) -> Iterator[Iterate]:
         """Yield the iterates of LSQR with their negative pixels set to zero."""
-        for state in super().descend(problem, weight):
+        for state in self.signed(problem, weight):
             image = np.maximum(state.image, 0)
             details = {**state.details, "pixels_set_to_zero": int((state.image < 0).sum())}
             if state.reason:
