@@ -3,7 +3,9 @@
 import numpy as np
 from scipy.optimize import minimize
 
+from oatkit import Geometry, Grid, plugin
 from oatkit.api import Problem
+from oatkit.simulate import arc_detectors, simulate_scan
 
 
 def noise_like(seed=0, rows=60, shape=(5, 6)):
@@ -40,6 +42,15 @@ def circles(n=20, detectors=16, samples=60, noise=0.02):
     image = sum(np.hypot(y - cy, x - cx) < r for cy, cx, r in [(0, 0, 6), (3, -2, 2), (-4, 3, 1.5), (1, 5, 2)])
     data = matrix @ image
     return Problem(matrix, data + noise * np.sqrt((data**2).mean()) * rng.standard_normal(data.size), (n, n))
+
+
+def scanned(coverage_deg=270.0):
+    """A breast-like body of 64 x 64 pixels behind the arc model, simulated on a finer grid, with noise."""
+    geometry = Geometry(arc_detectors(64, coverage_deg=coverage_deg), 20e6, 900, 15e-6, 1500)
+    arc = plugin("forward_model", "arc")()
+    scan = simulate_scan("breast", arc, geometry=geometry, pixels=151, snr_db=30.0)
+    grid = Grid((64, 64), 25e-3 / 64)
+    return Problem(arc.operator(geometry, grid), np.ravel(scan.signals[0, 0]), grid.shape, geometry, grid)
 
 
 def three_pixels():

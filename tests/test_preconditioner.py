@@ -3,26 +3,15 @@
 import numpy as np
 import pytest
 
-from oatkit import Geometry, Grid, plugin
 from oatkit.api import Problem
 from oatkit.builtin.regularizers.identity import Identity
 from oatkit.builtin.regularizers.laplacian import Laplacian
 from oatkit.builtin.solvers.convolution import gains_of, penalty_gains
 from oatkit.builtin.solvers.lsqr import Lsqr
 from oatkit.builtin.solvers.preconditioner import Preconditioner
-from oatkit.simulate import arc_detectors, simulate_scan
-from small_problems import Counting, circles
+from small_problems import Counting, circles, scanned
 
 SHAPE = (24, 20)
-
-
-def ring(coverage_deg):
-    """A scan's problem on 64 x 64 pixels."""
-    geometry = Geometry(arc_detectors(64, coverage_deg=coverage_deg), 20e6, 900, start_time_s=15e-6)
-    arc = plugin("forward_model", "arc")()
-    scan = simulate_scan("breast", arc, geometry=geometry, pixels=151, snr_db=30.0)
-    grid = Grid((64, 64), 25e-3 / 64)
-    return Problem(arc.operator(geometry, grid), np.ravel(scan.signals[0, 0]), grid.shape)
 
 
 def test_the_gains_of_penalties_are_those_of_their_stencils():
@@ -47,7 +36,7 @@ def test_it_spares_products_and_changes_nothing_else(coverage_deg):
     """With and without, LSQR reaches one image; with, and at its own weight, in less than 0.7 of the products, all of
     which it reports.
     """
-    problem = ring(coverage_deg)
+    problem = scanned(coverage_deg)
     counting = Counting(problem)
     counted = Problem(counting, problem.data, problem.shape)
     last = Lsqr().solve(counted)

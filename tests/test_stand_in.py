@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import LinearOperator
 
-from oatkit import Geometry, Grid, ValidationError, plugin
+from oatkit import ValidationError, plugin
 from oatkit.api import Problem
 from oatkit.builtin.regularizers.laplacian import Laplacian
 from oatkit.builtin.solvers.projected_gradient import projected_gradient
 from oatkit.builtin.solvers.quadratic_objective import QuadraticObjective
 from oatkit.builtin.solvers.quasi_newton import quasi_newton
 from oatkit.builtin.solvers.stand_in import Model, StandIn
-from oatkit.simulate import arc_detectors, simulate_scan
 from oatkit.weights import choose, with_weight
-from small_problems import Counting, circles, noise_like
+from small_problems import Counting, circles, noise_like, scanned
 
 SHAPE = (24, 20)
 RNG = np.random.default_rng(4)
@@ -35,14 +34,10 @@ def convolution(width=1.2):
     return Problem(operator, apply(np.random.default_rng(5).exponential(size=n) ** 3), SHAPE)
 
 
-@pytest.fixture(scope="module")
-def scanned():
+@pytest.fixture(name="scanned", scope="module")
+def scanned_once():
     """A scan's problem on 64 x 64 pixels."""
-    geometry = Geometry(arc_detectors(64), 20e6, 900, start_time_s=15e-6, speed_of_sound_m_s=1500)
-    arc = plugin("forward_model", "arc")()
-    scan = simulate_scan("breast", arc, geometry=geometry, pixels=151, snr_db=30.0)
-    grid = Grid((64, 64), 25e-3 / 64)
-    return Problem(arc.operator(geometry, grid), np.ravel(scan.signals[0, 0]), grid.shape, geometry, grid)
+    return scanned()
 
 
 def normal(problem, image):
