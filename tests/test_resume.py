@@ -213,7 +213,7 @@ def test_kills_at_any_time_cost_nothing(scan, whole, tmp_path):
     output = tmp_path / "out.zarr"
     patience = 0.1
     while not output.exists():
-        patience += rng.uniform(0.2, 0.6)
+        patience += rng.uniform(0.1, 0.3)
         with start(scan, output, 0.1) as process:
             try:
                 process.wait(patience)

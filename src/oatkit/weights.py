@@ -175,7 +175,7 @@ def sweep(
             if held_out is not None:
                 misfit = (whole.forward(last.image) - whole.data)[held_out]
                 point = replace(point, prediction_error=norm(misfit))
-        here = fit.near(last.image)
+            here = fit.near(last.image)
         on_point(point, last)
         yield point
 
